@@ -1,0 +1,46 @@
+"""`Tolerance`: every length a decision is measured against, born from the model's own size and precision."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from patchwright.models.errors import ParameterError
+
+if TYPE_CHECKING:
+    from patchwright.models.assembly import Assembly
+    from patchwright.models.triangulation import Triangulation
+
+ROUND_OFF_SHARE = 1e-6  # of the diagonal: cracks below it are round-off
+FIT_SHARE = 1e-4  # of the diagonal: the promise of the fitted surfaces unless told otherwise
+SMOOTH_ANGLE = 30.0  # degrees: edges that turn more are sharp
+
+
+@dataclass(frozen=True, slots=True)
+class Tolerance:
+    """Lengths in the model's unit, the angle in degrees.
+
+    `gap` is the round-off below which two points are the same; `fit` is how far a fitted surface may stray; `angle`
+    separates smooth from sharp edges.
+    """
+
+    gap: float
+    fit: float
+    angle: float = SMOOTH_ANGLE
+
+    @classmethod
+    def of(cls, thing: Assembly | Triangulation, *, fit: float | None = None, angle: float = SMOOTH_ANGLE) -> Tolerance:
+        """The tolerances of a model: `gap` from its size and distance to the origin, `fit` 1e-4 of its diagonal.
+
+        Raises
+        ------
+        ParameterError : a fit tolerance that is not positive and finite.
+        """
+        diagonal = thing.diagonal
+        reach = float(np.abs(thing.bounds).max())
+        single_precision = 4.0 * float(np.finfo(np.float32).eps) * reach
+        if fit is not None and not (np.isfinite(fit) and fit > 0.0):
+            raise ParameterError(f"the fit tolerance must be a positive length, got {fit}")
+        return cls(max(ROUND_OFF_SHARE * diagonal, single_precision), FIT_SHARE * diagonal if fit is None else fit, angle)

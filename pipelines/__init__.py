@@ -1,0 +1,1 @@
+"""Stages, recipes, reports, pictures and the command line."""

@@ -1,0 +1,1 @@
+"""Find defects; mend with the least change; lay out, project, fill, fit, connect."""

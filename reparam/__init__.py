@@ -1,0 +1,1 @@
+"""New parametrisations for old shapes."""

@@ -1,0 +1,1 @@
+"""Surface meets surface."""
