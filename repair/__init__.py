@@ -1,1 +1,28 @@
 """Find defects; mend with the least change; lay out, project, fill, fit, connect."""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from patchwright.repair.diagnose import diagnose
+    from patchwright.repair.diagnosis import Defect, Diagnosis
+    from patchwright.repair.ladder import repair
+    from patchwright.repair.result import Repaired, Verdict
+
+__all__ = ["Defect", "Diagnosis", "Repaired", "Verdict", "diagnose", "repair"]
+
+_HOMES = {
+    "Defect": "diagnosis",
+    "Diagnosis": "diagnosis",
+    "Repaired": "result",
+    "Verdict": "result",
+    "diagnose": "diagnose",
+    "repair": "ladder",
+}
+
+
+def __getattr__(name: str) -> Any:
+    """The public names, imported when first used."""
+    if name not in _HOMES:
+        raise AttributeError(f"module 'patchwright.repair' has no attribute {name!r}")
+    return getattr(import_module(f"patchwright.repair.{_HOMES[name]}"), name)

@@ -1,0 +1,236 @@
+"""The command line: `patchwright check | repair | convert | run | demo`.
+
+Only here do errors become sentences and exit codes: 0 done, 1 defects found or refused, 2 bad usage or input,
+3 internal failure. Heavy packages are imported inside the commands, so that `--help` answers at once.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import warnings
+from enum import Enum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from patchwright.models.errors import EngineError, GeometryError
+
+if TYPE_CHECKING:
+    from patchwright.pipelines.progress import Terminal
+    from patchwright.pipelines.study import Study
+
+DONE, FOUND, BAD_INPUT, INTERNAL = 0, 1, 2, 3
+
+app = typer.Typer(
+    name="patchwright",
+    help="Gets dirty CAD ready for CFD surface grids: mends STL and STEP with the least change and says what it changed.",
+    add_completion=False,
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+
+class Scope(str, Enum):
+    """How much a repair may touch."""
+
+    least = "least"
+    all = "all"
+
+
+class Openings(str, Enum):
+    """What becomes of planned openings."""
+
+    keep = "keep"
+    close = "close"
+
+
+Json = Annotated[bool, typer.Option("--json", help="Machine output on stdout, everything else on stderr.")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress.")]
+
+
+@app.command()
+def check(
+    files: Annotated[list[Path], typer.Argument(help="Files to examine.", show_default=False)],
+    json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Say what is wrong with each file and where; exit code 1 when anything is."""
+    from patchwright.models.io import read
+    from patchwright.pipelines.summary import defect_lines
+    from patchwright.repair import diagnose
+
+    terminal = _terminal(quiet)
+    results: list[dict[str, Any]] = []
+    clean = True
+    for path in files:
+        with terminal.stage(f"check {path.name}") as report:
+            report("reading", 0.0)
+            assembly = read(path)
+            report("diagnosing", 0.3)
+            diagnosis = diagnose(assembly)
+        clean &= diagnosis.clean
+        if json:
+            results.append({"file": str(path), "clean": diagnosis.clean, **diagnosis.to_json()})
+        else:
+            _say("\n".join(defect_lines(str(path), diagnosis)))
+    if json:
+        _say_json(results[0] if len(results) == 1 else results)
+    raise typer.Exit(DONE if clean else FOUND)
+
+
+@app.command()
+def repair(
+    file: Annotated[Path, typer.Argument(help="STL, OBJ, PLY, OFF, Cart3D, Plot3D, STEP or IGES.", show_default=False)],
+    output: Annotated[Path | None, typer.Option("-o", "--output", help="Output folder [<stem>-patchwright].")] = None,
+    scope: Annotated[Scope, typer.Option(help="least keeps what is good; all resurfaces everything.")] = Scope.least,
+    openings: Annotated[Openings, typer.Option(help="Keep or close planned openings.")] = Openings.keep,
+    tolerance: Annotated[float | None, typer.Option(help="Fit tolerance in model units [1e-4 of the diagonal].")] = None,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Mend a file: closed model, NURBS patches, surface grid, and a report of every change."""
+    from patchwright.pipelines.recipe import repair_recipe
+    from patchwright.pipelines.run import run
+
+    recipe = repair_recipe(file, output, scope=scope.value, openings=openings.value, tolerance=tolerance)
+    _finish(run(recipe, terminal=_terminal(quiet)), json)
+
+
+@app.command()
+def demo(
+    output: Annotated[Path, typer.Option("-o", "--output", help="Output folder.")] = Path("demo-patchwright"),
+    seed: Annotated[int, typer.Option(help="Seed of the injected defects.")] = 1,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Make a dirty aircraft, repair it, and compare the result with the known truth."""
+    from patchwright.pipelines.demo import run_demo
+
+    _finish(run_demo(output, seed=seed, terminal=_terminal(quiet)), json)
+
+
+@app.command("run")
+def run_(
+    recipe: Annotated[Path, typer.Argument(help="Recipe (TOML).", show_default=False)],
+    json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Run a recipe: a TOML file with source, folder and stages."""
+    from patchwright.pipelines.run import run
+
+    _finish(run(recipe, terminal=_terminal(quiet)), json)
+
+
+@app.command()
+def convert(
+    source: Annotated[Path, typer.Argument(help="File to read.", show_default=False)],
+    target: Annotated[Path, typer.Argument(help="File to write; its suffix picks the format.", show_default=False)],
+    quiet: Quiet = False,
+) -> None:
+    """Read one format and write another, repairing nothing."""
+    from patchwright.models.io import read, write
+    from patchwright.models.io.registry import format_of
+
+    format_of(target)
+    with _terminal(quiet).stage("convert") as report:
+        report("reading", 0.0)
+        assembly = read(source)
+        report("writing", 0.5)
+        write(target, assembly)
+    _say(f"{source} -> {target}: {len(assembly.parts)} parts, {sum(len(p.triangulation) for p in assembly.parts)} triangles")
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        from importlib.metadata import version
+
+        _say(f"patchwright {version('patchwright')}")
+        raise typer.Exit(DONE)
+
+
+@app.callback()
+def _root(
+    version: Annotated[bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version.")] = False,
+) -> None:
+    pass
+
+
+def _terminal(quiet: bool) -> Terminal:
+    from patchwright.pipelines.progress import Terminal
+
+    terminal = Terminal(quiet=quiet)
+    warnings.showwarning = lambda message, *rest, **more: terminal.line(f"  warning: {message}")
+    return terminal
+
+
+def _finish(study: Study, json: bool) -> None:
+    """Print the outcome and leave with its exit code."""
+    from patchwright.pipelines.summary import study_json, study_lines
+    from patchwright.repair.result import Verdict
+
+    if json:
+        _say_json(study_json(study))
+    else:
+        _say("\n".join(study_lines(study)))
+    refused = study.repaired is not None and study.repaired.verdict is Verdict.REFUSED
+    raise typer.Exit(FOUND if refused else DONE)
+
+
+_stdout = 1  # the descriptor results go to; `main` keeps the real one and sends native chatter to stderr
+
+
+def _say(text: str) -> None:
+    os.write(_stdout, (text + "\n").encode())
+
+
+def _say_json(value: Any) -> None:
+    import json
+
+    _say(json.dumps(value, indent=1, allow_nan=False))
+
+
+def main() -> None:
+    """Entry point of the console script."""
+    global _stdout
+    import click
+
+    if not any(word in ("--help", "-h") for word in sys.argv[1:]) and len(sys.argv) > 1:
+        sys.stdout.flush()
+        _stdout = os.dup(1)
+        os.dup2(2, 1)
+    try:
+        code = typer.main.get_command(app).main(standalone_mode=False)
+    except click.exceptions.Abort:
+        code = 130
+    except click.exceptions.ClickException as error:
+        error.show()
+        code = BAD_INPUT
+    except EngineError as error:
+        code = _fail(str(error), INTERNAL)
+    except GeometryError as error:
+        code = _fail(str(error), BAD_INPUT)
+    except BrokenPipeError:
+        code = DONE
+    except KeyboardInterrupt:
+        code = _fail("interrupted; nothing half-written was left", 130)
+    except MemoryError:
+        code = _fail("out of memory; try a coarser file or a larger machine", INTERNAL)
+    except Exception as error:  # noqa: BLE001 - the one place where the unforeseen becomes a sentence
+        if os.environ.get("PATCHWRIGHT_TRACEBACK"):
+            raise
+        sentence = f"internal failure ({type(error).__name__}: {error}); set PATCHWRIGHT_TRACEBACK=1 and report the trace"
+        code = _fail(sentence, INTERNAL)
+    sys.exit(code if isinstance(code, int) else DONE)
+
+
+def _fail(sentence: str, code: int) -> int:
+    print(f"patchwright: {sentence}", file=sys.stderr)  # noqa: T201
+    return code
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,146 @@
+"""The pictures of a repair: before with its defects marked, after by rung, the deviation map."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from patchwright.models.arrays import Array
+from patchwright.models.triangulation import Triangulation
+from patchwright.pipelines.progress import Report
+from patchwright.pipelines.scenes import Scene, draw_scenes
+from patchwright.pipelines.study import Study
+from patchwright.repair.result import Repaired, Rung, Verdict
+
+MARKED = ("error", "warning")
+KEPT_COLOUR, PATCH_COLOUR, INVENTED_COLOUR = (184, 196, 208), (122, 166, 194), (226, 140, 60)
+MOST_DRAWN = 400_000  # triangles; a finer model is drawn from every k-th patch point
+MOST_SPOTS = 6
+
+
+def draw(study: Study, report: Report) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Draw the pictures of a study into its folder.
+
+    Returns
+    -------
+    (file names, notes): the notes hold one sentence where there is no picture to be had.
+    """
+    report("drawing", 0.2)
+    scenes = [_before(study)]
+    scenes += _spots(study)
+    if study.repaired is not None and study.repaired.verdict is not Verdict.REFUSED:
+        scenes += _after(study, study.repaired)
+    else:
+        (study.folder / "after.png").unlink(missing_ok=True)
+    sentence = draw_scenes(scenes)
+    names = tuple(s.path.name for s in scenes if s.path.exists())
+    return names, () if sentence is None else (sentence,)
+
+
+def _before(study: Study) -> Scene:
+    body = study.assembly.triangulation
+    scene = Scene(study.folder / "before.png", f"before: {Path(study.source).name}", body.bounds)
+    scene.surface(body)
+    if study.before is not None:
+        scene.lines(free_edges(body), colour="#c03030", width=2.5)
+        where = [d.where for d in study.before.defects if d.severity in MARKED]
+        scene.points(np.array(where, dtype=np.float64).reshape(-1, 3), colour="#c03030", width=8.0)
+    return scene
+
+
+def _spots(study: Study) -> list[Scene]:
+    """Close-ups of the gravest defects, one file each."""
+    for old in study.folder.glob("defect-*.png"):
+        old.unlink()
+    if study.before is None:
+        return []
+    body = study.assembly.triangulation
+    edges = free_edges(body)
+    marked = [d for d in study.before.defects if d.severity in MARKED]
+    spread: list[int] = []
+    for kind in dict.fromkeys(d.kind for d in marked):  # one of each kind first, the largest
+        own = [i for i, d in enumerate(marked) if d.kind == kind]
+        spread.append(max(own, key=lambda i: marked[i].size))
+    scenes = []
+    for number, i in enumerate(spread[:MOST_SPOTS], start=1):
+        defect = marked[i]
+        reach = min(max(1.5 * defect.size, 0.02 * body.diagonal), 0.5 * body.diagonal)
+        where = np.asarray(defect.where)
+        box = np.stack([where - reach / 2, where + reach / 2])
+        near = (np.abs(body.corners.mean(axis=1) - where) < 1.5 * reach).all(axis=1)
+        scene = Scene(study.folder / f"defect-{number}.png", f"{defect.kind} at {_coordinates(where)}", box, zoom=1.0)
+        scene.surface(body.take(near).compact(), edges=True)
+        if len(edges):
+            scene.lines(edges[(np.abs(edges.mean(axis=1) - where) < 1.5 * reach).all(axis=1)], colour="#c03030", width=3.0)
+        scene.points(where[None], colour="#c03030", width=14.0)
+        scenes.append(scene)
+    return scenes
+
+
+def _coordinates(where: Array) -> str:
+    return "(" + ", ".join(f"{x:.5g}" for x in where) + ")"
+
+
+def _after(study: Study, repaired: Repaired) -> list[Scene]:
+    body, colours, borders = _output_surface(repaired)
+    scene = Scene(study.folder / "after.png", f"after: {repaired.verdict.value}", body.bounds)
+    scene.surface(body, colours=colours).lines(borders, colour="#33475a", width=1.2)
+    scenes = [scene]
+    if repaired.verdict is not Verdict.CLEAN and repaired.network is not None:
+        from patchwright.models.tree import Tree
+
+        distance = Tree.of(study.assembly.triangulation).closest(body.corners.mean(axis=1)).distance
+        bar = "distance to the input"
+        limit = [0.0, max(2.0 * study.tolerance.fit, 1e-300)]
+        deviation = Scene(study.folder / "deviation.png", "deviation from the input", body.bounds)
+        scenes.append(deviation.surface(body, values=distance, range=limit, bar=bar))
+    return scenes
+
+
+def _output_surface(repaired: Repaired) -> tuple[Triangulation, Array, Array]:
+    """Triangles of the output, their colours by rung, and the patch borders as segments."""
+    if repaired.network is None:
+        body = repaired.triangulation
+        colours = np.tile(np.array(KEPT_COLOUR, dtype=np.uint8), (len(body), 1))
+        if body.tags is not None and len(repaired.faces) == len(body.tag_names):
+            kept = np.array([f.rung in (Rung.KEEP, Rung.WELD) for f in repaired.faces])
+            colours[~kept[body.tags]] = INVENTED_COLOUR
+        return body, colours, face_borders(body)
+    network = repaired.network
+    intervals = int(np.clip(np.sqrt(MOST_DRAWN / (2 * len(network))), 4, 12)) // 4 * 4
+    body = network.tessellate(intervals)
+    from patchwright.repair.mesh_route import network_invented
+
+    colours = np.tile(np.array(PATCH_COLOUR, dtype=np.uint8), (len(body), 1))
+    colours[network_invented(network, intervals)] = INVENTED_COLOUR
+    along = network.edges.sample(9)
+    return body, colours, np.stack([along[:, :-1], along[:, 1:]], axis=2).reshape(-1, 2, 3)
+
+
+def free_edges(body: Triangulation) -> Array:
+    """(k, 2, 3) edges one triangle uses, vertices at the same place counted as one."""
+    from patchwright.models.adjacency import Adjacency
+
+    places, where = np.unique(body.vertices, axis=0, return_inverse=True)
+    merged = where.reshape(-1)[body.triangles]
+    adjacency = Adjacency.of(Triangulation(places, merged))
+    return np.asarray(places[adjacency.edges[adjacency.free]])
+
+
+def face_borders(body: Triangulation) -> Array:
+    """(k, 2, 3) edges between triangles of different tags, and free edges."""
+    from patchwright.models.adjacency import Adjacency
+
+    places, where = np.unique(body.vertices, axis=0, return_inverse=True)
+    merged = Triangulation(places, where.reshape(-1)[body.triangles])
+    adjacency = Adjacency.of(merged)
+    border = adjacency.free.copy()
+    if body.tags is not None:
+        low = np.full(len(adjacency.edges), np.iinfo(np.int64).max)
+        high = np.full(len(adjacency.edges), -1)
+        for k in range(3):
+            np.minimum.at(low, adjacency.triangle_edges[:, k], body.tags)
+            np.maximum.at(high, adjacency.triangle_edges[:, k], body.tags)
+        border |= low != high
+    return np.asarray(places[adjacency.edges[border]])

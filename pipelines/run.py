@@ -1,0 +1,58 @@
+"""`run`: a recipe from file to folder."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+from pathlib import Path
+
+from patchwright.models.assembly import Assembly
+from patchwright.models.errors import ParameterError
+from patchwright.models.tolerance import Tolerance
+from patchwright.pipelines.progress import Terminal
+from patchwright.pipelines.recipe import Recipe, load_recipe
+from patchwright.pipelines.stages import STAGES
+from patchwright.pipelines.study import StageReport, Study
+
+
+def run(recipe: Recipe | Path | str, *, assembly: Assembly | None = None, terminal: Terminal | None = None) -> Study:
+    """Run a recipe.
+
+    Parameters
+    ----------
+    recipe : a `Recipe` or the path of one
+    assembly : taken instead of reading the recipe's source
+    terminal : where progress is shown; None is silent
+
+    Returns
+    -------
+    Study : every stage's artefact; what was written is in `.files`.
+
+    Raises
+    ------
+    GeometryError : unreadable input, an option without meaning. A refused repair raises nothing: see `.repaired.verdict`.
+    """
+    plan = recipe if isinstance(recipe, Recipe) else load_recipe(Path(recipe))
+    shown = terminal or Terminal(quiet=True)
+    started = time.perf_counter()
+    if assembly is None:
+        from patchwright.models.io import read
+
+        with shown.stage("read") as report:
+            report("reading", 0.0)
+            assembly = read(plan.source, unit=plan.unit)
+    if not any(len(part.triangulation) for part in assembly.parts):
+        raise ParameterError(f"{plan.source}: holds no faces and no triangles; there is nothing to work on")
+    study = Study(
+        str(plan.source), plan.folder, assembly, Tolerance.of(assembly, fit=plan.tolerance),
+        reports=(StageReport("read", time.perf_counter() - started),),
+    )
+    for step in plan.steps:
+        stage = STAGES[step.name]
+        options = stage.settings(step.options)
+        started = time.perf_counter()
+        with shown.stage(step.name) as report:
+            study, figures = stage.action(study, options, report)
+        seconds = time.perf_counter() - started
+        study = replace(study, reports=(*study.reports, StageReport(step.name, seconds, figures)))
+    return study

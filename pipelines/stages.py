@@ -1,0 +1,92 @@
+"""The stages a recipe is made of; each maps (study, options) to (study, figures) and is found by its name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+from patchwright.models.errors import ParameterError
+from patchwright.pipelines.progress import Report
+from patchwright.pipelines.study import Study
+
+Outcome = tuple[Study, dict[str, Any]]
+
+
+@dataclass(frozen=True, slots=True)
+class Stage:
+    """A named step; `options` are the names it understands, with their defaults."""
+
+    name: str
+    action: Callable[[Study, dict[str, Any], Report], Outcome]
+    options: dict[str, Any]
+
+    def settings(self, given: dict[str, Any]) -> dict[str, Any]:
+        """The defaults with the given options put over them.
+
+        Raises
+        ------
+        ParameterError : an option the stage does not know.
+        """
+        unknown = sorted(set(given) - set(self.options))
+        if unknown:
+            known = ", ".join(sorted(self.options)) or "none"
+            raise ParameterError(f"stage {self.name!r} has no option {', '.join(map(repr, unknown))}; it has: {known}")
+        return {**self.options, **given}
+
+
+def _diagnose(study: Study, options: dict[str, Any], report: Report) -> Outcome:
+    from patchwright.repair import diagnose
+
+    report("diagnosing", 0.0)
+    before = diagnose(study.assembly, tolerance=study.tolerance)
+    return replace(study, before=before), {"defects": len(before.defects), "clean": before.clean}
+
+
+def _repair(study: Study, options: dict[str, Any], report: Report) -> Outcome:
+    from patchwright.repair import repair
+
+    repaired = repair(
+        study.assembly,
+        scope=options["scope"],
+        openings=options["openings"],
+        tolerance=study.tolerance,
+        diagnosis=study.before,
+        progress=report,
+    )
+    return replace(study, repaired=repaired), {"verdict": repaired.verdict.value, "faces": len(repaired.faces)}
+
+
+def _write(study: Study, options: dict[str, Any], report: Report) -> Outcome:
+    from patchwright.pipelines.outputs import write_outputs
+
+    files = write_outputs(study, tuple(options["files"]), report)
+    return replace(study, files=study.files + files), {"files": list(files)}
+
+
+def _pictures(study: Study, options: dict[str, Any], report: Report) -> Outcome:
+    from patchwright.pipelines.pictures import draw
+
+    files, notes = draw(study, report)
+    return replace(study, files=study.files + files, notes=study.notes + notes), {"files": list(files)}
+
+
+def _report(study: Study, options: dict[str, Any], report: Report) -> Outcome:
+    from patchwright.pipelines.report import write_report
+
+    files = write_report(study, report)
+    return replace(study, files=study.files + files), {"files": list(files)}
+
+
+GEOMETRY_FILES = ("repaired.step", "repaired.igs", "repaired.stl", "grid.xyz")
+
+STAGES: dict[str, Stage] = {
+    stage.name: stage
+    for stage in (
+        Stage("diagnose", _diagnose, {}),
+        Stage("repair", _repair, {"scope": "least", "openings": "keep"}),
+        Stage("write", _write, {"files": GEOMETRY_FILES}),
+        Stage("pictures", _pictures, {}),
+        Stage("report", _report, {}),
+    )
+}

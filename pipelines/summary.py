@@ -1,0 +1,120 @@
+"""A study in words for the terminal and as plain values for machines; both tell the same figures."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict
+from typing import Any
+
+from patchwright.pipelines.study import Study
+from patchwright.repair.deviation import Spread
+from patchwright.repair.diagnosis import Diagnosis
+from patchwright.repair.result import Repaired, Verdict
+
+MOST_LINES = 12
+
+
+def defect_lines(name: str, diagnosis: Diagnosis) -> list[str]:
+    """The diagnosis of one file: a headline, then the defects, gravest first."""
+    if diagnosis.clean:
+        lines = [f"{name}: clean"]
+    else:
+        errors = sum(d.severity == "error" for d in diagnosis.defects)
+        warnings = sum(d.severity == "warning" for d in diagnosis.defects)
+        lines = [f"{name}: {errors} errors, {warnings} warnings"]
+    rank = {"error": 0, "warning": 1, "info": 2}
+    ordered = sorted(diagnosis.defects, key=lambda d: (rank[d.severity], -d.size))
+    for defect in ordered[:MOST_LINES]:
+        x, y, z = defect.where
+        lines.append(f"  {defect.severity:<7} {defect.kind:<18} at ({x:.6g}, {y:.6g}, {z:.6g})  {defect.message}")
+    if len(ordered) > MOST_LINES:
+        lines.append(f"  and {len(ordered) - MOST_LINES} more; --json lists all")
+    return lines
+
+
+def study_lines(study: Study) -> list[str]:
+    """What a repair did, in at most a screenful."""
+    lines = []
+    repaired = study.repaired
+    if repaired is None:
+        if study.before is not None:
+            lines += defect_lines(study.source, study.before)
+    else:
+        lines.append(f"{study.source}: {repaired.verdict.value}")
+        for problem in repaired.problems[:MOST_LINES]:
+            x, y, z = problem.where
+            lines.append(f"  refused  {problem.kind} at ({x:.6g}, {y:.6g}, {z:.6g}): {problem.message}")
+        for entry in repaired.ledger[:MOST_LINES]:
+            parts = f" ({', '.join(entry.parts)})" if any(entry.parts) else ""
+            reason = f": {entry.reason}" if entry.reason else ""
+            lines.append(f"  {entry.rung.value:<24} {entry.count:>8} {entry.what}{parts}{reason}")
+        if len(repaired.ledger) > MOST_LINES:
+            lines.append(f"  and {len(repaired.ledger) - MOST_LINES} more entries in report.html")
+        if repaired.deviation is not None:
+            lines.append(f"  input -> output  {_spread(repaired.deviation.input_to_output)}")
+            lines.append(f"  output -> input  {_spread(repaired.deviation.output_to_input)}")
+        if repaired.verdict is not Verdict.REFUSED:
+            lines.append(f"  invented surface {100.0 * repaired.invented:.3g} % of the area")
+        for key, value in repaired.figures.items():
+            lines.append(f"  {key:<28} {_short(value)}")
+    lines += [f"  note: {note}" for note in study.notes]
+    if study.files:
+        lines.append(f"  written to {study.folder}/: {', '.join(study.files)}")
+    lines.append(f"  {sum(r.seconds for r in study.reports):.1f} s")
+    return lines
+
+
+def study_json(study: Study) -> dict[str, Any]:
+    """Everything a machine may want to know of a study."""
+    out: dict[str, Any] = {
+        "source": study.source,
+        "unit": study.assembly.unit,
+        "parts": list(study.assembly.names),
+        "diagonal": study.assembly.diagonal,
+        "tolerance": asdict(study.tolerance),
+        "stages": [{"stage": r.stage, "seconds": round(r.seconds, 3), **r.figures} for r in study.reports],
+        "files": list(study.files),
+        "notes": list(study.notes),
+    }
+    if study.before is not None:
+        out["before"] = study.before.to_json()
+    if study.repaired is not None:
+        out.update(_repaired_json(study.repaired))
+    return _plain(out)
+
+
+def _repaired_json(repaired: Repaired) -> dict[str, Any]:
+    return {
+        "verdict": repaired.verdict.value,
+        "invented": repaired.invented,
+        "deviation": None if repaired.deviation is None else asdict(repaired.deviation),
+        "figures": repaired.figures,
+        "problems": [asdict(p) for p in repaired.problems],
+        "ledger": [asdict(e) for e in repaired.ledger],
+        "faces": [asdict(f) for f in repaired.faces],
+        "seams": [asdict(s) for s in repaired.seams],
+    }
+
+
+def _plain(value: Any) -> Any:
+    """JSON knows no NaN, no infinity, no enums and no numpy scalars."""
+    if isinstance(value, dict):
+        return {str(k): _plain(v) for k, v in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(v) for v in value]
+    if hasattr(value, "item") and not isinstance(value, str):
+        value = value.item()
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return getattr(value, "value", value)
+
+
+def _spread(spread: Spread) -> str:
+    return (
+        f"median {spread.median:.3g}, 99 % {spread.p99:.3g}, largest {spread.largest:.3g}, "
+        f"{100.0 * spread.coverage:.2f} % within {spread.tolerance:.3g}"
+    )
+
+
+def _short(value: Any) -> str:
+    return f"{value:.4g}" if isinstance(value, float) else str(value)

@@ -1,0 +1,86 @@
+"""Drawing: the only module that imports pyvista, run as a child process so that a missing display cannot hurt a repair.
+
+    python -m patchwright.pipelines.view SCENES.npz
+
+The archive is made by `pictures.save_scenes`; every scene in it becomes one PNG file.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+SIZE = (1400, 900)
+BACKGROUND = "#ffffff"
+
+
+def draw_scene(scene: dict[str, Any], arrays: dict[str, Any], path: Path) -> None:
+    """Draw one scene off-screen and write it as PNG (beside, then renamed)."""
+    import pyvista as pv
+
+    plotter = pv.Plotter(off_screen=True, window_size=list(scene.get("size", SIZE)))
+    plotter.set_background(BACKGROUND)
+    plotter.enable_anti_aliasing("ssaa")
+    for layer in scene["layers"]:
+        _add(plotter, pv, layer, arrays)
+    if scene.get("title"):
+        plotter.add_text(scene["title"], font_size=11, color="#222222", position="upper_left")
+    direction = np.asarray(scene.get("direction", (-1.0, -1.6, 0.9)))
+    low, high = np.asarray(scene["box"][0]), np.asarray(scene["box"][1])
+    centre, reach = (low + high) / 2.0, max(float(np.linalg.norm(high - low)), 1e-300)
+    plotter.camera.focal_point = centre
+    plotter.camera.position = centre + 2.0 * reach * direction / np.linalg.norm(direction)
+    plotter.camera.up = (0.0, 0.0, 1.0)
+    plotter.reset_camera(bounds=[low[0], high[0], low[1], high[1], low[2], high[2]])
+    plotter.camera.zoom(scene.get("zoom", 1.25))
+    beside = path.with_name(f".{path.name}.tmp.png")
+    plotter.screenshot(str(beside))
+    plotter.close()
+    beside.replace(path)
+
+
+def _add(plotter: Any, pv: Any, layer: dict[str, Any], arrays: dict[str, Any]) -> None:
+    kind, key = layer["kind"], layer["key"]
+    if kind == "surface":
+        triangles = arrays[f"{key}.triangles"]
+        faces = np.column_stack([np.full(len(triangles), 3), triangles]).ravel()
+        mesh = pv.PolyData(arrays[f"{key}.vertices"], faces)
+        options: dict[str, Any] = {"smooth_shading": False, "ambient": 0.25, "diffuse": 0.75, "specular": 0.1}
+        if f"{key}.values" in arrays:
+            mesh.cell_data["values"] = arrays[f"{key}.values"]
+            bar = {"title": layer.get("bar", ""), "color": "#222222", "n_labels": 5, "fmt": "%.1e"}
+            plotter.add_mesh(mesh, scalars="values", cmap="viridis", clim=layer.get("range"), scalar_bar_args=bar, **options)
+        elif f"{key}.colours" in arrays:
+            mesh.cell_data["rgb"] = arrays[f"{key}.colours"]
+            plotter.add_mesh(mesh, scalars="rgb", rgb=True, **options)
+        else:
+            plotter.add_mesh(mesh, color=layer.get("colour", "#b8c4d0"), show_edges=layer.get("edges", False),
+                             edge_color="#5a6672", line_width=0.5, **options)
+    elif kind == "lines":
+        points = arrays[f"{key}.points"]
+        if len(points):
+            cells = np.column_stack([np.full(len(points) // 2, 2), np.arange(len(points)).reshape(-1, 2)]).ravel()
+            mesh = pv.PolyData(points, lines=cells)
+            plotter.add_mesh(mesh, color=layer.get("colour", "#c03030"), line_width=layer.get("width", 2.0), lighting=False)
+    elif kind == "points":
+        points = arrays[f"{key}.points"]
+        if len(points):
+            plotter.add_points(points, color=layer.get("colour", "#c03030"), point_size=layer.get("width", 9.0),
+                               render_points_as_spheres=True)
+
+
+def main(archive: str) -> int:
+    """Draw every scene of an archive."""
+    with np.load(archive) as data:
+        arrays = {key: data[key] for key in data.files}
+    for scene in json.loads(str(arrays.pop("scenes"))):
+        draw_scene(scene, arrays, Path(scene["path"]))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1]))

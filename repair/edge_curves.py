@@ -1,0 +1,146 @@
+"""One cubic curve per edge of a layout, built once and shared by both its patches.
+
+An edge follows its path on the geometry in arc-length speed; the curve is the least-squares C2 cubic through samples
+of the path with both ends held on the layout's vertices.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from patchwright.models.arrays import Array, BoolArray, IntArray, frozen
+from patchwright.repair.spline_space import interior_fit, refinement, uniform_collocation
+
+SAMPLES_PER_CELL = 6
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class EdgeCurves:
+    """The curves of all edges, each in its own nested spline space.
+
+    Parameters
+    ----------
+    cells : (e,) number of polynomial pieces of each edge
+    offsets : (e + 1,) rows of `controls` that belong to each edge
+    controls : (sum(cells + 3), 3) control points
+    """
+
+    cells: IntArray
+    offsets: IntArray
+    controls: Array
+
+    @classmethod
+    def pack(cls, cells: IntArray, groups: list[tuple[IntArray, Array]]) -> EdgeCurves:
+        """From groups (edge indices, (k, cells + 3, 3) control points) that cover every edge once."""
+        offsets = np.concatenate([[0], np.cumsum(cells + 3)])
+        controls = np.empty((int(offsets[-1]), 3))
+        for which, points in groups:
+            rows = offsets[which][:, None] + np.arange(points.shape[1])
+            controls[rows] = points
+        return cls(frozen(cells, np.int64), frozen(offsets, np.int64), frozen(controls, np.float64))
+
+    def groups(self) -> Iterator[tuple[int, IntArray, Array]]:
+        """(cells, edge indices, (k, cells + 3, 3) control points) for each cell count in use."""
+        for cells in np.unique(self.cells):
+            which = np.flatnonzero(self.cells == cells)
+            rows = self.offsets[which][:, None] + np.arange(cells + 3)
+            yield int(cells), which, self.controls[rows]
+
+    def refined(self, edges: IntArray, cells: int) -> Array:
+        """(len(edges), cells + 3, 3) control points of the same curves in a space of `cells` pieces."""
+        out = np.empty((len(edges), cells + 3, 3))
+        for own in np.unique(self.cells[edges]):
+            mask = self.cells[edges] == own
+            rows = self.offsets[edges[mask]][:, None] + np.arange(own + 3)
+            points = self.controls[rows]
+            out[mask] = points if own == cells else np.einsum("ij,kjd->kid", refinement(int(own), cells), points)
+        return out
+
+    def sample(self, count: int) -> Array:
+        """(e, count, 3) points at `count` equidistant parameters of every edge."""
+        out = np.empty((len(self.cells), count, 3))
+        for cells, which, points in self.groups():
+            out[which] = np.einsum("ij,kjd->kid", uniform_collocation(cells, count), points)
+        out[:, 0] = self.controls[self.offsets[:-1]]
+        out[:, -1] = self.controls[self.offsets[1:] - 1]
+        return out
+
+
+def resample(points: Array, offsets: IntArray, count: int) -> Array:
+    """Equidistant (by arc length) points on each of many polylines.
+
+    Parameters
+    ----------
+    points, offsets : (k, 3) vertices of all polylines in order and (e + 1,) where each starts
+    count : points per polyline, both ends included
+
+    Returns
+    -------
+    (e, count, 3); the ends are the polylines' own, bit for bit.
+    """
+    step = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    step[offsets[1:-1] - 1] = 0.0  # the jump from one polyline to the next has no length
+    along = np.concatenate([[0.0], np.cumsum(step)])
+    start, stop = along[offsets[:-1]], along[offsets[1:] - 1]
+    wanted = start[:, None] + (stop - start)[:, None] * np.linspace(0.0, 1.0, count)
+    segment = np.searchsorted(along, wanted, side="right") - 1
+    segment = np.clip(segment, offsets[:-1, None], np.maximum(offsets[1:, None] - 2, offsets[:-1, None]))
+    length = along[segment + 1] - along[segment]
+    share = np.divide(wanted - along[segment], length, out=np.zeros_like(wanted), where=length > 0)
+    share = np.clip(share, 0.0, 1.0)[..., None]
+    out = (1.0 - share) * points[segment] + share * points[segment + 1]
+    out[:, 0], out[:, -1] = points[offsets[:-1]], points[offsets[1:] - 1]
+    return np.asarray(out)
+
+
+def fit_edges(paths: list[tuple[IntArray, Array]], cells: IntArray) -> EdgeCurves:
+    """Least-squares curves through samples of the paths.
+
+    Parameters
+    ----------
+    paths : groups (edge indices, (k, count, 3) equidistant samples of the path); each group shares its cell count
+    cells : (e,) pieces per edge
+    """
+    groups = []
+    for which, samples in paths:
+        own, count = int(cells[which[0]]), samples.shape[1]
+        basis = uniform_collocation(own, count)
+        ends = basis[1:-1, :1] * samples[:, :1] + basis[1:-1, -1:] * samples[:, -1:]
+        inner = np.einsum("ij,kjd->kid", interior_fit(own, count), samples[:, 1:-1] - ends)
+        groups.append((which, np.concatenate([samples[:, :1], inner, samples[:, -1:]], axis=1)))
+    return EdgeCurves.pack(cells, groups)
+
+
+def with_end_tangents(edges: EdgeCurves, normals: Array, second: Array, fixed: BoolArray) -> EdgeCurves:
+    """The curves with their end tangents turned into the tangent planes at their vertices.
+
+    Parameters
+    ----------
+    normals : (e, 2, 3) unit surface normal at the start and end of each edge (zero: leave that end)
+    second : (e, 2, 3) the normal on the other side of a sharp edge (equal to `normals` on a smooth one)
+    fixed : (e,) edges to leave alone
+
+    The tangent keeps its length; on a sharp edge it follows the line where both planes meet.
+    """
+    groups = []
+    for _, which, points in edges.groups():
+        points = points.copy()
+        for end, (tip, arm) in enumerate(((0, 1), (-1, -2))):
+            leg = points[:, arm] - points[:, tip]
+            n1, n2 = normals[which, end], second[which, end]
+            flat = leg - (leg * n1).sum(1, keepdims=True) * n1
+            line = np.cross(n1, n2)
+            size = np.linalg.norm(line, axis=1, keepdims=True)
+            crease = size[:, 0] > 0.34  # 20 degrees: below it the two planes are one and their line is noise
+            line = np.divide(line, size, out=np.zeros_like(line), where=size > 0)
+            flat[crease] = ((leg * line).sum(1, keepdims=True) * line)[crease]
+            new = np.linalg.norm(flat, axis=1, keepdims=True)
+            old = np.linalg.norm(leg, axis=1, keepdims=True)
+            sound = (new[:, 0] > 0.5 * old[:, 0]) & ~fixed[which]  # a leg nearly along the normal is left
+            flat = np.divide(flat * old, new, out=flat.copy(), where=new > 0)
+            points[sound, arm] = (points[:, tip] + flat)[sound]
+        groups.append((which, points))
+    return EdgeCurves.pack(np.asarray(edges.cells), groups)

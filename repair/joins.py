@@ -1,0 +1,208 @@
+"""Smooth joins: one normal field per edge and vertex, and the inner control rows that follow it.
+
+Source: Hamann, Jean, Razdan, section 3 (tangent-plane continuity after Faux & Pratt). Departure: instead of one
+constant ratio per edge, both neighbours are made to have the edge's common normal at the collocation points, which
+lets them differ in their number of pieces. Between the points the angle that is left falls with the cell size; it is
+measured, never assumed.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from patchwright.models.arrays import Array, BoolArray, IntArray
+from patchwright.repair.patch_nets import PatchNets, normals_of
+from patchwright.repair.quad_layout import QuadLayout
+from patchwright.repair.spline_space import collocation, greville, uniform_collocation
+
+FIELD_SAMPLES = 33  # parameters at which an edge's normal field is stored
+
+# corner k of a quad as index of u and v
+CORNER_U, CORNER_V = np.array([0, 1, 1, 0]), np.array([0, 0, 1, 1])
+
+
+def corner_normals(nets: PatchNets) -> Array:
+    """(m, 4, 3) unit normal of every patch at its corners, extrapolated from a tenth and a fifth of a cell inside.
+
+    At the corner itself the normal hangs on two edge tangents alone, which may be nearly parallel at an irregular vertex.
+    """
+    out = np.empty((len(nets), 4, 3))
+    for (m, n), which, group in nets.groups():
+        near, far = (_inner_normals(group, (m, n), share) for share in (0.1, 0.2))
+        out[which] = _unit(2.0 * near - far)
+    return out
+
+
+def _inner_normals(group: Array, cells: tuple[int, int], share: float) -> Array:
+    """(k, 4, 3) unit normals `share` of a cell inside each corner."""
+    m, n = cells
+    us, vs = np.array([share / m, 1 - share / m]), np.array([share / n, 1 - share / n])
+    du = np.einsum("ai,kijd,bj->kabd", collocation(m, us, 1), group, collocation(n, vs), optimize=True)
+    dv = np.einsum("ai,kijd,bj->kabd", collocation(m, us), group, collocation(n, vs, 1), optimize=True)
+    return np.asarray(normals_of(du, dv)[:, CORNER_U, CORNER_V])
+
+
+def sector_normals(layout: QuadLayout, at_corners: Array) -> Array:
+    """(m, 4, 3) the mean normal of the smooth sector each quad corner belongs to.
+
+    A sector is the set of corners round a vertex that reach each other across smooth edges; sharp edges and boundaries
+    separate sectors, so a vertex on a crease has one normal per side.
+    """
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    smooth = smooth_edges(layout)
+    quads, sides = np.nonzero(smooth[layout.quad_edges])
+    edge = layout.quad_edges[quads, sides]
+    order = np.argsort(edge, kind="stable")
+    quads, sides = quads[order].reshape(-1, 2), sides[order].reshape(-1, 2)  # the two uses of each smooth edge
+    # the uses run opposite ways: the start corner of one is the end corner of the other
+    start = quads * 4 + sides
+    end = quads * 4 + (sides + 1) % 4
+    turned = layout.edge_reversed[quads[:, 0], sides[:, 0]] == layout.edge_reversed[quads[:, 1], sides[:, 1]]
+    other_start = np.where(turned, start[:, 1], end[:, 1])
+    other_end = np.where(turned, end[:, 1], start[:, 1])
+    i = np.concatenate([start[:, 0], end[:, 0]])
+    j = np.concatenate([other_start, other_end])
+    count = 4 * len(layout.quads)
+    _, label = connected_components(coo_matrix((np.ones(len(i)), (i, j)), shape=(count, count)), directed=False)
+    total = np.zeros((label.max() + 1, 3))
+    np.add.at(total, label, at_corners.reshape(-1, 3))
+    length = np.linalg.norm(total, axis=1, keepdims=True)
+    total = np.divide(total, length, out=np.zeros_like(total), where=length > 0)
+    return np.asarray(total[label].reshape(-1, 4, 3))
+
+
+def smooth_edges(layout: QuadLayout) -> BoolArray:
+    """(e,) edges with a patch on either side and no crease between them."""
+    return np.asarray(~layout.sharp & ~layout.boundary)
+
+
+def edge_end_normals(layout: QuadLayout, sectors: Array) -> tuple[Array, Array]:
+    """Two (e, 2, 3) arrays: the sector normals at the start and end of each edge on its first and on its second side.
+
+    On a smooth edge and on a boundary both are the same.
+    """
+    e = len(layout.edges)
+    out = np.zeros((2, e, 2, 3))
+    seen = np.zeros(e, dtype=np.int64)
+    for k in range(4):
+        edge = layout.quad_edges[:, k]
+        start, end = sectors[:, k], sectors[:, (k + 1) % 4]
+        flip = layout.edge_reversed[:, k, None]
+        slot = seen[edge]
+        # two quads may reach one edge by the same side number: the second use goes to the second slot
+        first_use = np.zeros(len(edge), dtype=bool)
+        first_use[np.unique(edge, return_index=True)[1]] = True
+        slot = np.minimum(slot + ~first_use, 1)
+        out[slot, edge, 0] = np.where(flip, end, start)
+        out[slot, edge, 1] = np.where(flip, start, end)
+        np.add.at(seen, edge, 1)
+    single = seen == 1
+    out[1, single] = out[0, single]
+    return out[0], out[1]
+
+
+def side_normals(layout: QuadLayout, nets: PatchNets, count: int = FIELD_SAMPLES) -> Array:
+    """(m, 4, count, 3) unit normals along each side at equidistant parameters of its edge, in the edge's direction."""
+    out = np.empty((len(nets), 4, count, 3))
+    for (m, n), which, group in nets.groups():
+        bu, bv = uniform_collocation(m, count), uniform_collocation(n, count)
+        du, dv = uniform_collocation(m, count, 1), uniform_collocation(n, count, 1)
+        for k, (ends_u, ends_v) in enumerate(((None, 0), (-1, None), (None, -1), (0, None))):
+            if ends_v is not None:
+                tu = np.einsum("ai,kid->kad", du, group[:, :, ends_v])
+                tv = np.einsum("ai,kijd,j->kad", bu, group, dv[ends_v], optimize=True)
+            else:
+                tu = np.einsum("aj,kijd,i->kad", bv, group, du[ends_u], optimize=True)
+                tv = np.einsum("ai,kid->kad", dv, group[:, ends_u])
+            out[which, k] = normals_of(tu, tv)
+    # sides 0 and 1 are sampled along +u, +v, which is the quad's own way round; 2 and 3 against it
+    backward = layout.edge_reversed != np.array([False, False, True, True])
+    out[backward] = out[backward][:, ::-1]
+    return out
+
+
+def edge_fields(layout: QuadLayout, sides: Array, sectors: Array) -> Array:
+    """(e, FIELD_SAMPLES, 3) the common unit normal along every edge, in the edge's direction.
+
+    The mean of both sides' normals (`side_normals`), running to the sector normals at the vertices. Only the smooth
+    edges' rows mean anything.
+    """
+    total = np.zeros((len(layout.edges), sides.shape[2], 3))
+    for k in range(4):
+        np.add.at(total, layout.quad_edges[:, k], sides[:, k])
+    start, _ = edge_end_normals(layout, sectors)
+    total = _unit(total)
+    # the ends jump to the sector normal; the jump is spread linearly along the edge, so the field stays smooth
+    t = np.linspace(0.0, 1.0, sides.shape[2])[:, None]
+    total = total + (1 - t) * (start[:, :1] - total[:, :1]) + t * (start[:, 1:] - total[:, -1:])
+    return _unit(total)
+
+
+def _unit(vectors: Array) -> Array:
+    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0)
+
+
+def follow_fields(layout: QuadLayout, nets: PatchNets, fields: Array) -> PatchNets:
+    """The patches with their first inner rows moved along the normal until they have the edges' common normals.
+
+    At the Greville points of every smooth side the cross-boundary derivative is made perpendicular to the edge's
+    normal; the twist control points serve two sides and take the least-squares compromise.
+    """
+    smooth = smooth_edges(layout)
+    groups = []
+    for (m, n), which, group in nets.groups():
+        groups.append((which, _follow(layout, which, group.copy(), (m, n), fields, smooth)))
+    return PatchNets.pack(np.asarray(nets.cells), groups)
+
+
+def _follow(layout: QuadLayout, which: IntArray, nets: Array, cells: tuple[int, int], fields: Array, smooth: BoolArray) -> Array:
+    from scipy.interpolate import CubicSpline
+
+    m, n = cells
+    # the ring of inner control points, each with the direction it may move in
+    ring = [(i, j) for i in range(1, m + 2) for j in range(1, n + 2) if i in (1, m + 1) or j in (1, n + 1)]
+    slot = {ij: s for s, ij in enumerate(ring)}
+    direction = np.zeros((len(which), len(ring), 3))
+    rows, right = [], []
+    for k, along in ((0, 0), (1, 1), (2, 0), (3, 1)):
+        own = cells[along]
+        sites = greville(own)
+        field = fields[layout.quad_edges[which, k]]
+        backward = layout.edge_reversed[which, k] != (k >= 2)
+        field[backward] = field[backward][:, ::-1]
+        normal = CubicSpline(np.linspace(0.0, 1.0, field.shape[1]), field, axis=1)(sites)
+        normal = _unit(normal)
+        place = {0: lambda i: (i, 1), 1: lambda i: (m + 1, i), 2: lambda i: (i, n + 1), 3: lambda i: (1, i)}[k]
+        border = {0: nets[:, :, 0], 1: nets[:, -1], 2: nets[:, :, -1], 3: nets[:, 0]}[k]
+        inner = {0: nets[:, :, 1], 1: nets[:, -2], 2: nets[:, :, -2], 3: nets[:, 1]}[k]
+        # the shared boundary's own tangent stays perpendicular to the normal
+        tangent = _unit(np.einsum("ai,kid->kad", collocation(own, sites, 1), border))
+        normal = _unit(normal - (normal * tangent).sum(-1, keepdims=True) * tangent)
+        active = smooth[layout.quad_edges[which, k]]
+        basis = collocation(own, sites)[1:-1]
+        leg = np.einsum("ai,kid->kad", basis, inner - border)
+        scale = np.linalg.norm(leg, axis=-1)
+        scale[scale == 0.0] = 1.0
+        row = np.zeros((len(which), own + 1, len(ring)))
+        for i in range(1, own + 2):
+            s = slot[place(i)]
+            direction[:, s] += np.where(active[:, None], normal[:, i], 0.0)
+        rows.append((row, k, own, basis, normal[:, 1:-1], place, active, scale))
+        right.append(-np.einsum("kad,kad->ka", leg, normal[:, 1:-1]))
+    direction = _unit(direction)
+    for (row, _, own, basis, normal, place, active, scale), value in zip(rows, right, strict=True):
+        for i in range(1, own + 2):
+            s = slot[place(i)]
+            row[:, :, s] = basis[:, i] * np.einsum("kad,kd->ka", normal, direction[:, s])
+        row /= scale[..., None]
+        value /= scale
+        row[~active], value[~active] = 0.0, 0.0
+    matrix = np.concatenate([r[0] for r in rows], axis=1)
+    value = np.concatenate(right, axis=1)
+    move = np.einsum("ksa,ka->ks", np.linalg.pinv(matrix, rcond=1e-8), value)
+    i, j = np.array(ring).T
+    nets[:, i, j] += move[..., None] * direction
+    return nets

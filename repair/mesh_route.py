@@ -1,0 +1,187 @@
+"""The ladder for triangulations: keep, weld, cut, bridge; then patches fitted to what is there.
+
+A triangulation has no faces to keep: its kept triangles stay as they are in the output triangulation, and the NURBS
+patches are fitted to them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from patchwright.models.assembly import Assembly, Part
+from patchwright.models.arrays import Array
+from patchwright.models.tolerance import Tolerance
+from patchwright.models.tree import Tree
+from patchwright.models.triangulation import Triangulation
+from patchwright.repair.deviation import Deviation, two_sided
+from patchwright.repair.mend import BRIDGED, CUT, KEPT, Mended, mend
+from patchwright.repair.network import PatchNetwork
+from patchwright.repair.network_seams import measure
+from patchwright.repair.patch_fit import Target
+from patchwright.repair.quad_layout import QuadLayout, quad_layout
+from patchwright.repair.result import Face, LedgerEntry, Point, Problem, Progress, Repaired, Rung, Seam, Verdict
+from patchwright.repair.resurface import resurface
+
+COVERAGE_GOAL = 0.99  # share of the area, both ways, within the fit tolerance
+RETRIES = 2
+FINER = 2.0  # quads of each retry against the one before
+TESSELLATION = 12  # intervals per patch side when the patches are measured or written as triangles
+GRID = 8  # intervals per patch side of the structured grid
+
+
+def repair_mesh(assembly: Assembly, tolerance: Tolerance, *, scope: str, layout: str | QuadLayout, openings: str, clean: bool,
+                progress: Progress) -> Repaired:
+    """Mend a triangulated assembly and fit patches to it.
+
+    Parameters
+    ----------
+    clean : whether diagnosis found nothing wrong
+    scope : "least" keeps the input's triangles in the output triangulation, "all" takes the patches' tessellation
+
+    The other arguments are those of `repair`.
+    """
+    raw = assembly.triangulation
+    mended = mend(raw, tolerance, openings=openings, progress=progress)
+    ledger = _mending_ledger(assembly, mended)
+    if mended.problems:
+        problems = tuple(Problem(p.kind, _point(p.where), float(p.size), p.message) for p in mended.problems)
+        return _refused(assembly, mended, ledger, problems)
+    network, deviation, tries = _fit(mended, tolerance, layout, progress)
+    seams = measure(network)
+    faces = _faces(network, mended)
+    invented = float(mended.triangulation.areas[mended.origin == BRIDGED].sum() / mended.triangulation.areas.sum())
+    ledger += (_fitting_entry(network, mended, tolerance, tries),)
+    if scope == "all":
+        tessellation = network.tessellate(TESSELLATION)
+        tags = network.layout.tags[tessellation.tags] if tessellation.tags is not None else None
+        triangulation = replace(tessellation, tags=tags, tag_names=mended.triangulation.tag_names)
+    else:
+        triangulation = mended.triangulation
+    changed = bool(mended.actions or mended.dropped)
+    verdict = Verdict.INVENTED if invented > 0 else Verdict.CLEAN if clean and not changed else Verdict.REPAIRED
+    parts = tuple(
+        Part(face.name, Triangulation(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64)), surface=surface, body="repaired")
+        for face, surface in zip(faces, network.surfaces(), strict=True)
+    )
+    return Repaired(
+        verdict, faces, seams, triangulation, ledger, deviation, invented, (),
+        Assembly(parts, unit=assembly.unit, source=assembly.source, topology=network.topology()),
+        grid=network.grid(GRID), network=network, figures=_figures(network, mended, seams, deviation),
+    )
+
+
+def _fit(mended: Mended, tolerance: Tolerance, layout: str | QuadLayout, progress: Progress) -> tuple[PatchNetwork, Deviation, int]:
+    """Lay out and fit, with finer quads until the coverage holds; the best network is kept."""
+    body = mended.triangulation
+    invented = np.asarray(mended.origin == BRIDGED)
+    tree = Tree.of(body)
+    target = Target(tree, invented)
+    best: tuple[PatchNetwork, Deviation] | None = None
+    wanted: int | None = None
+    for attempt in range(1 + RETRIES):
+        progress("laying out quads", attempt / (1 + RETRIES))
+        quads = quad_layout(body, target=wanted, angle=tolerance.angle) if isinstance(layout, str) else layout
+        network = resurface(quads, target, tolerance, noise=mended.noise, progress=progress)
+        progress("measuring coverage", 0.0)
+        skip = network_invented(network, TESSELLATION)
+        deviation = two_sided(
+            body, network.tessellate(TESSELLATION), tolerance.fit, skip_before=invented, skip_after=skip, before_tree=tree
+        )
+        if best is None or deviation.coverage > best[1].coverage:
+            best = network, deviation
+        if deviation.coverage >= COVERAGE_GOAL or not isinstance(layout, str):
+            break
+        wanted = int(FINER * len(quads.quads))
+    return *best, attempt + 1
+
+
+def network_invented(network: PatchNetwork, intervals: int) -> Array:
+    """(triangles,) whether each triangle of `network.tessellate(intervals)` lies on invented surface."""
+    cell = np.arange(intervals) * 8 // intervals
+    mark = network.invented[:, cell][:, :, cell]
+    return np.repeat(mark.reshape(-1), 2)
+
+
+def _point(where: Array) -> Point:
+    x, y, z = np.asarray(where, dtype=np.float64).tolist()
+    return x, y, z
+
+
+def _faces(network: PatchNetwork, mended: Mended) -> tuple[Face, ...]:
+    """One face per patch; its origin are the tags of the triangles it was laid over."""
+    names = mended.triangulation.tag_names or ("",)
+    cells = network.points(8)
+    a, b = cells[:, 1:, 1:] - cells[:, :-1, :-1], cells[:, 1:, :-1] - cells[:, :-1, 1:]
+    area = 0.5 * np.linalg.norm(np.cross(a, b), axis=-1)
+    total = area.sum(axis=(1, 2))
+    share = (area * network.invented).sum(axis=(1, 2)) / np.where(total > 0, total, 1.0)
+    return tuple(
+        Face(f"{names[tag] or 'patch'}-{i + 1}", (names[tag],), Rung.BRIDGE if s == 1.0 else Rung.RESURFACE, float(d), float(s), float(t))
+        for i, (tag, s, d, t) in enumerate(zip(network.layout.tags.tolist(), share, network.deviation, total, strict=True))
+    )
+
+
+def _mending_ledger(assembly: Assembly, mended: Mended) -> tuple[LedgerEntry, ...]:
+    """What was kept, part by part, every action of the mender, and everything that was dropped."""
+    entries = []
+    body = mended.triangulation
+    tags = body.tags if body.tags is not None else np.zeros(len(body), dtype=np.int64)
+    areas = body.areas
+    for i, name in enumerate(body.tag_names or ("",)):
+        own = tags == i
+        for origin, rung, words in (
+            (KEPT, Rung.KEEP, "triangles kept"),
+            (CUT, Rung.CUT, "pieces of triangles cut where bodies cross"),
+            (BRIDGED, Rung.BRIDGE, "triangles invented to bridge gaps"),
+        ):
+            which = own & (mended.origin == origin)
+            if which.any():
+                entries.append(LedgerEntry(words, rung, (name,), "", count=int(which.sum()), area=float(areas[which].sum())))
+    for action in mended.actions:
+        entries.append(
+            LedgerEntry(
+                action.kind, Rung(action.rung), (), action.reason, count=int(action.count), tolerance=float(action.tolerance),
+                largest_move=float(action.largest_move), area=float(action.area), where=_point(action.where),
+            )
+        )
+    for piece in mended.dropped:
+        entries.append(
+            LedgerEntry(
+                piece.what, Rung.DROP, tuple(piece.parts), piece.why, count=len(piece.triangles), area=float(piece.area),
+                where=_point(piece.where),
+            )
+        )
+    return tuple(entries)
+
+
+def _fitting_entry(network: PatchNetwork, mended: Mended, tolerance: Tolerance, tries: int) -> LedgerEntry:
+    worst = float(np.nanmax(network.deviation))
+    over = int((network.deviation > tolerance.fit).sum())
+    reason = f"bicubic patches over {len(network)} quads, layout {tries}, {over} of them beyond the fit tolerance"
+    return LedgerEntry("patches fitted", Rung.RESURFACE, mended.triangulation.tag_names, reason, count=len(network),
+                       tolerance=tolerance.fit, largest_move=worst)
+
+
+def _figures(network: PatchNetwork, mended: Mended, seams: Sequence[Seam], deviation: Deviation) -> dict[str, float | int | str | bool]:
+    """The numbers of the report's first table."""
+    smooth = np.array([s.angle for s in seams if s.kind == "smooth"] or [0.0])
+    return {
+        "patches": len(network),
+        "control points": len(network.nets.controls),
+        "closed": bool(mended.closed),
+        "openings kept": len(mended.openings),
+        "noise": float(mended.noise),
+        "coverage": deviation.coverage,
+        "largest seam gap": max((s.gap for s in seams if s.kind != "free"), default=0.0),
+        "largest smooth seam angle": float(smooth.max()),
+        "median smooth seam angle": float(np.median(smooth)),
+        "volume": mended.triangulation.volume if mended.closed else float("nan"),
+    }
+
+
+def _refused(assembly: Assembly, mended: Mended, ledger: tuple[LedgerEntry, ...], problems: tuple[Problem, ...]) -> Repaired:
+    return Repaired(Verdict.REFUSED, (), (), mended.triangulation, ledger, None, 0.0, problems,
+                    Assembly((), unit=assembly.unit, source=assembly.source))

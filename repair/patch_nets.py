@@ -1,0 +1,87 @@
+"""The control nets of all patches of a network, grouped by size so that every step runs on whole arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from patchwright.models.arrays import Array, IntArray, frozen
+from patchwright.repair.edge_curves import EdgeCurves
+from patchwright.repair.quad_layout import QuadLayout
+from patchwright.repair.spline_space import uniform_collocation
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PatchNets:
+    """Bicubic control nets on uniform knots.
+
+    Parameters
+    ----------
+    cells : (m, 2) pieces along u and v of each patch
+    offsets : (m + 1,) rows of `controls` that belong to each patch
+    controls : (sum((cells_u + 3) * (cells_v + 3)), 3) control points, u slowest
+    """
+
+    cells: IntArray
+    offsets: IntArray
+    controls: Array
+
+    @classmethod
+    def pack(cls, cells: IntArray, groups: list[tuple[IntArray, Array]]) -> PatchNets:
+        """From groups (patch indices, (k, M + 3, N + 3, 3)) that cover every patch once."""
+        offsets = np.concatenate([[0], np.cumsum((cells + 3).prod(axis=1))])
+        controls = np.empty((int(offsets[-1]), 3))
+        for which, nets in groups:
+            rows = offsets[which][:, None] + np.arange(nets.shape[1] * nets.shape[2])
+            controls[rows] = nets.reshape(len(which), -1, 3)
+        return cls(frozen(cells, np.int64), frozen(offsets, np.int64), frozen(controls, np.float64))
+
+    def __len__(self) -> int:
+        return len(self.cells)
+
+    def groups(self) -> Iterator[tuple[tuple[int, int], IntArray, Array]]:
+        """((M, N), patch indices, (k, M + 3, N + 3, 3) nets) for each size in use."""
+        for m, n in np.unique(self.cells, axis=0):
+            which = np.flatnonzero((self.cells == (m, n)).all(axis=1))
+            yield (int(m), int(n)), which, self.nets(which)
+
+    def nets(self, which: IntArray) -> Array:
+        """(k, M + 3, N + 3, 3) nets of patches of one size."""
+        m, n = self.cells[which[0]] + 3
+        rows = self.offsets[which][:, None] + np.arange(m * n)
+        return self.controls[rows].reshape(len(which), m, n, 3)
+
+    def sample(self, count: int, derivative: tuple[int, int] = (0, 0)) -> Array:
+        """(m, count, count, 3) a derivative of every patch at count x count equidistant parameters."""
+        out = np.empty((len(self), count, count, 3))
+        for (m, n), which, nets in self.groups():
+            out[which] = evaluate(nets, uniform_collocation(m, count, derivative[0]), uniform_collocation(n, count, derivative[1]))
+        return out
+
+
+def evaluate(nets: Array, basis_u: Array, basis_v: Array) -> Array:
+    """(k, a, b, 3) tensor-product values of nets (k, M, N, 3) by basis matrices (a, M) and (b, N)."""
+    return np.asarray(np.matmul(basis_v, np.einsum("ai,kijd->kajd", basis_u, nets, optimize=True)))
+
+
+def sides(layout: QuadLayout, edges: EdgeCurves, which: IntArray, cells: tuple[int, int]) -> tuple[Array, Array, Array, Array]:
+    """Control rows (south, north, west, east) of patches of one size, each (k, cells + 3, 3) and run along +u or +v.
+
+    Corner k of a quad is at (u, v) = (0, 0), (1, 0), (1, 1), (0, 1); edge k joins corners k and k + 1.
+    """
+    out = []
+    for k, along, backward in ((0, 0, False), (2, 0, True), (3, 1, True), (1, 1, False)):
+        points = edges.refined(layout.quad_edges[which, k], cells[along])
+        flip = layout.edge_reversed[which, k] != backward
+        points[flip] = points[flip, ::-1]
+        out.append(points)
+    return out[0], out[1], out[2], out[3]
+
+
+def normals_of(du: Array, dv: Array) -> Array:
+    """Unit normals of paired tangents (..., 3); zero where the tangents are parallel."""
+    normal = np.cross(du, dv)
+    length = np.linalg.norm(normal, axis=-1, keepdims=True)
+    return np.divide(normal, length, out=np.zeros_like(normal), where=length > 0)

@@ -1,0 +1,219 @@
+"""Resurfacing: a quad layout over a mended triangulation becomes a network of bicubic patches within a tolerance.
+
+The paper's chain (Hamann, Jean, Razdan, section 3) for every quad: shared boundary curves, Coons patch, projection,
+gap filling, bicubic approximant, discrete error; then one pass of smooth joins. Curves and patches whose error exceeds
+the tolerance get twice the pieces, until the tolerance is met, the pieces no longer help, or there are `MOST_CELLS`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from patchwright.models.arrays import Array, BoolArray, IntArray
+from patchwright.models.tolerance import Tolerance
+from patchwright.repair.edge_curves import SAMPLES_PER_CELL, EdgeCurves, fit_edges, resample, with_end_tangents
+from patchwright.repair.joins import (
+    corner_normals,
+    edge_end_normals,
+    edge_fields,
+    follow_fields,
+    sector_normals,
+    side_normals,
+    smooth_edges,
+)
+from patchwright.repair.network import PatchNetwork
+from patchwright.repair.patch_fit import Target, fit_group, samples_for
+from patchwright.repair.patch_nets import PatchNets, evaluate, sides
+from patchwright.repair.quad_layout import QuadLayout
+from patchwright.repair.spline_space import collocation
+
+FIRST_CELLS = 2
+MOST_CELLS = 16
+WORTH = 0.7  # twice the pieces must bring the error below this share of what it was, else they are not kept
+
+Progress = Callable[[str, float], None]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _State:
+    """Nets with the error and the gap marks of each patch."""
+
+    edges: EdgeCurves
+    nets: PatchNets
+    error: Array  # (m,)
+    invented: BoolArray  # (m, 8, 8)
+
+
+def resurface(layout: QuadLayout, target: Target, tolerance: Tolerance, *, method: str = "smooth", noise: float = 0.0,
+              progress: Progress | None = None) -> PatchNetwork:
+    """Fit the network.
+
+    Parameters
+    ----------
+    layout : quads whose vertices and edge paths lie on the target
+    target : the mended triangulation and which of its triangles are invented
+    tolerance : `.fit` bounds the distance between patches and data at the error samples (HJR 17)
+    method : gap filling, see `filling.METHODS`
+    noise : scatter of the data
+    progress : called with a label and a share in [0, 1]
+
+    Returns
+    -------
+    PatchNetwork; `deviation` tells the patches that did not reach the tolerance.
+    """
+    say = progress or (lambda label, share: None)
+    edge_cells = np.full(len(layout.edges), FIRST_CELLS, dtype=np.int64)
+    patch_cells = np.full((len(layout.quads), 2), FIRST_CELLS, dtype=np.int64)
+    say("fitting patches", 0.0)
+    edges = _fit_edge_curves(layout, target, edge_cells)
+    everything = np.arange(len(layout.quads))
+    state = _fit(layout, edges, patch_cells, everything, None, target, method, noise)
+    sectors = sector_normals(layout, corner_normals(state.nets))
+    ends = edge_end_normals(layout, sectors)
+
+    def aligned(curves: EdgeCurves) -> EdgeCurves:
+        return with_end_tangents(curves, *ends, np.zeros(len(layout.edges), dtype=bool))
+
+    edges = aligned(edges)
+    state = _fit(layout, edges, patch_cells, everything, None, target, method, noise)
+    rounds = int(np.log2(MOST_CELLS // FIRST_CELLS))
+    stuck_edges = np.zeros(len(layout.edges), dtype=bool)
+    stuck_patches = np.zeros(len(layout.quads), dtype=bool)
+    for turn in range(rounds):
+        say("refining patches", (turn + 1) / (rounds + 1))
+        edge_error = _edge_errors(layout, edges, target)
+        finer_edges = (edge_error > tolerance.fit) & ~stuck_edges
+        if finer_edges.any():
+            wanted = np.where(finer_edges, np.asarray(edges.cells) * 2, edges.cells)
+            trial = aligned(_fit_edge_curves(layout, target, wanted))
+            stuck_edges |= finer_edges & (_edge_errors(layout, trial, target) > WORTH * edge_error)
+            # a curve that gained nothing keeps its old pieces
+            keep = np.where(stuck_edges, edges.cells, wanted)
+            edges = aligned(_fit_edge_curves(layout, target, keep))
+        changed = (edges.cells != state.edges.cells)[layout.quad_edges].any(axis=1)
+        poor = (state.error > tolerance.fit) & ~stuck_patches
+        if not (changed.any() or poor.any()):
+            break
+        own = np.asarray(edges.cells)[layout.quad_edges]
+        needed = np.stack([own[:, [0, 2]].max(axis=1), own[:, [1, 3]].max(axis=1)], axis=1)
+        cells = np.maximum(np.where(poor[:, None], np.asarray(state.nets.cells) * 2, state.nets.cells), needed)
+        redo = np.flatnonzero(changed | poor)
+        new = _fit(layout, edges, cells, redo, state, target, method, noise)
+        stuck_patches[redo] = poor[redo] & (new.error[redo] > WORTH * state.error[redo])
+        state = new
+    say("joining patches", 0.95)
+    fields = edge_fields(layout, side_normals(layout, state.nets), sectors)
+    nets = follow_fields(layout, state.nets, fields)
+    error = _patch_errors(layout, nets, everything, target, state.invented)
+    # a join that spoils a patch is undone for that patch: position before smoothness
+    spoiled = np.flatnonzero(error > np.maximum(2.0 * state.error, tolerance.fit))
+    if len(spoiled):
+        nets = _merge(nets, state.nets, spoiled)
+        error[spoiled] = state.error[spoiled]
+    return PatchNetwork(layout, edges, nets, state.invented, error)
+
+
+def _fit_edge_curves(layout: QuadLayout, target: Target, cells: IntArray) -> EdgeCurves:
+    """Curves through the paths; smooth edges' samples are put onto the target, sharp ones follow their crease."""
+    free = smooth_edges(layout)
+    groups = []
+    for own in np.unique(cells):
+        which = np.flatnonzero(cells == own)
+        count = SAMPLES_PER_CELL * int(own) + 1
+        samples = _path_samples(layout, which, count)
+        on_surface = free[which]
+        inner = samples[on_surface, 1:-1]
+        if inner.size:
+            samples[on_surface, 1:-1] = target.tree.closest(inner.reshape(-1, 3)).points.reshape(inner.shape)
+        groups.append((which, samples))
+    return fit_edges(groups, np.asarray(cells))
+
+
+def _path_samples(layout: QuadLayout, which: IntArray, count: int) -> Array:
+    """(k, count, 3) equidistant points on the paths of some edges."""
+    lengths = np.diff(layout.path_offsets)[which]
+    offsets = np.concatenate([[0], np.cumsum(lengths)])
+    rows = np.repeat(layout.path_offsets[which] - offsets[:-1], lengths) + np.arange(offsets[-1])
+    return resample(layout.path_points[rows], offsets, count)
+
+
+def _edge_errors(layout: QuadLayout, edges: EdgeCurves, target: Target) -> Array:
+    """(e,) largest distance of each curve from its crease, or from the target where it is smooth."""
+    free = smooth_edges(layout)
+    out = np.zeros(len(layout.edges))
+    for cells, which, controls in edges.groups():
+        count = 4 * cells + 1
+        mid = (np.arange(count) + 0.5) / count
+        points = np.einsum("ai,kid->kad", collocation(cells, mid), controls)
+        on_surface = free[which]
+        if on_surface.any():
+            flat = points[on_surface].reshape(-1, 3)
+            out[which[on_surface]] = target.tree.closest(flat).distance.reshape(-1, count).max(axis=1)
+        if (~on_surface).any():
+            dense = _path_samples(layout, which[~on_surface], 4 * count + 1)
+            gap = points[~on_surface][:, :, None] - dense[:, None]
+            out[which[~on_surface]] = np.linalg.norm(gap, axis=-1).min(axis=2).max(axis=1)
+    return out
+
+
+def _fit(layout: QuadLayout, edges: EdgeCurves, cells: IntArray, which: IntArray, old: _State | None, target: Target,
+         method: str, noise: float) -> _State:
+    """Fit the patches `which`; the others are taken from `old`."""
+    groups: list[tuple[IntArray, Array]] = []
+    invented = np.zeros((len(layout.quads), 8, 8), dtype=bool) if old is None else old.invented.copy()
+    for m, n in np.unique(cells[which], axis=0):
+        some = which[(cells[which] == (m, n)).all(axis=1)]
+        fitted = fit_group(sides(layout, edges, some, (int(m), int(n))), (int(m), int(n)), target, method=method, noise=noise)
+        groups.append((some, fitted.nets))
+        invented[some] = _mark(~fitted.found)
+    if old is not None:
+        rest = np.setdiff1d(np.arange(len(layout.quads)), which)
+        for m, n in np.unique(old.nets.cells[rest], axis=0):
+            some = rest[(old.nets.cells[rest] == (m, n)).all(axis=1)]
+            groups.append((some, old.nets.nets(some)))
+    nets = PatchNets.pack(cells, groups)
+    error = np.zeros(len(layout.quads)) if old is None else old.error.copy()
+    error[which] = _patch_errors(layout, nets, which, target, invented)[which]
+    return _State(edges, nets, error, invented)
+
+
+def _mark(missing: BoolArray) -> BoolArray:
+    """(k, 8, 8) whether any of the points of each cell of an 8 x 8 split is missing."""
+    k, m, n = missing.shape
+    out = np.zeros((k, 8, 8), dtype=bool)
+    for axis_u, axis_v in ((0, 0), (1, 0), (0, 1), (1, 1)):
+        i = np.clip((np.arange(m) * 8 - axis_u) // (m - 1), 0, 7)
+        j = np.clip((np.arange(n) * 8 - axis_v) // (n - 1), 0, 7)
+        patch, a, b = np.nonzero(missing)
+        out[patch, i[a], j[b]] = True
+    return out
+
+
+def _patch_errors(layout: QuadLayout, nets: PatchNets, which: IntArray, target: Target, invented: BoolArray) -> Array:
+    """(m,) largest distance from the data at edge midpoints and centres of the fit's cells (HJR 17), gaps left out."""
+    out = np.full(len(nets), np.nan)
+    for m, n in np.unique(nets.cells[which], axis=0):
+        some = which[(nets.cells[which] == (m, n)).all(axis=1)]
+        nu, nv = samples_for(int(m)), samples_for(int(n))
+        us, vs = (np.arange(nu) + 0.5) / nu, (np.arange(nv) + 0.5) / nv
+        points = evaluate(nets.nets(some), collocation(int(m), us), collocation(int(n), vs))
+        closest = target.tree.closest(points.reshape(-1, 3))
+        distance = closest.distance.copy()
+        distance[target.invented[closest.triangle]] = 0.0
+        distance = distance.reshape(points.shape[:3])
+        gap = invented[some][:, np.minimum((us * 8).astype(int), 7)][:, :, np.minimum((vs * 8).astype(int), 7)]
+        distance[gap] = 0.0
+        out[some] = distance.max(axis=(1, 2))
+    return out
+
+
+def _merge(new: PatchNets, old: PatchNets, from_old: IntArray) -> PatchNets:
+    """`new` with some patches taken from `old` (same sizes)."""
+    controls = new.controls.copy()
+    for patch in from_old:
+        rows = slice(new.offsets[patch], new.offsets[patch + 1])
+        controls[rows] = old.controls[rows]
+    return PatchNets(new.cells, new.offsets, controls)
