@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from patchwright.models.arrays import Array, BoolArray, IntArray
+from patchwright.models.arrays import Array, BoolArray
 from patchwright.models.tree import Tree
 from patchwright.repair.coons import coons_grid, offset_distance, offset_normals
 from patchwright.repair.filling import FillStatus, fill
@@ -43,14 +43,13 @@ class Target:
 class FittedGroup:
     """Patches of one size.
 
-    `nets` (k, M + 3, N + 3, 3); `grid` (k, m + 1, n + 1, 3) the points they approximate; `found` (k, m + 1, n + 1)
-    where those came from data; `triangle` the triangle hit or -1; `status` one per patch.
+    `nets` (k, M + 3, N + 3, 3); `grid` (k, m + 1, n + 1, 3) the points they approximate; `data` (k, m + 1, n + 1)
+    where those came from the input and not from gap filling; `status` one per patch.
     """
 
     nets: Array
     grid: Array
-    found: BoolArray
-    triangle: IntArray
+    data: BoolArray
     status: tuple[FillStatus, ...]
 
 
@@ -67,13 +66,13 @@ def fit_group(rows: tuple[Array, Array, Array, Array], cells: tuple[int, int], t
     inner = np.zeros(coons.shape[:3], dtype=bool)
     inner[:, 1:-1, 1:-1] = True
     hits = project(coons[inner], normal[inner], distance[inner], target.tree)
-    data = hits.hit & ~target.invented[hits.triangle]
+    known = hits.hit & ~target.invented[hits.triangle]
     offset = np.zeros(coons.shape[:3])
-    found = ~inner
-    found[inner] = data
-    triangle = np.full(coons.shape[:3], -1, dtype=np.int64)
-    triangle[inner] = np.where(data, hits.triangle, -1)
+    found = ~inner  # the boundary curves are given, wherever they run
+    found[inner] = known
     offset[inner] = (1.0 - 2.0 * hits.t) * distance[inner]  # signed height of p above the Coons patch
+    data = found.copy()
+    data[~inner] = ~target.invented[target.tree.closest(coons[~inner]).triangle]
     # no data under the whole patch: its guide is the bridging surface itself
     bare = ~found[:, 1:-1, 1:-1].any(axis=(1, 2))
     guided = inner & bare[:, None, None]
@@ -87,7 +86,7 @@ def fit_group(rows: tuple[Array, Array, Array, Array], cells: tuple[int, int], t
         status.append(one)
     offset[bare[:, None, None] & ~guided] = 0.0
     grid = coons + offset[..., None] * normal  # HJR 10 and 13
-    return FittedGroup(_least_squares(rows, grid, cells), grid, found, triangle, tuple(status))
+    return FittedGroup(_least_squares(rows, grid, cells), grid, data, tuple(status))
 
 
 def _least_squares(rows: tuple[Array, Array, Array, Array], grid: Array, cells: tuple[int, int]) -> Array:

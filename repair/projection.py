@@ -7,11 +7,14 @@ only if its triangle faces the same way as the patch and lies nearer than 0.4 of
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from patchwright.models.arrays import Array, BoolArray, IntArray
-from patchwright.models.tree import Tree
+
+if TYPE_CHECKING:
+    from patchwright.models.tree import Tree
 
 FACING = 0.2  # cosine: a triangle turned further from the patch normal belongs to another skin or to a step
 SKIN_SHARE = 0.4  # of the local thickness: hits farther from the patch may be the other skin

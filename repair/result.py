@@ -29,14 +29,14 @@ class Verdict(str, Enum):
 
 
 class Rung(str, Enum):
-    """The rungs of the least-change ladder, from nothing to everything."""
+    """The rungs of the least-change ladder, from nothing to everything; "weld" is also sewing of round-off."""
 
     KEEP = "keep"
-    WELD = "weld or sew round-off"
-    CUT = "cut at the intersection"
-    BRIDGE = "bridge a gap"
+    WELD = "weld"
+    CUT = "cut"
+    BRIDGE = "bridge"
     RESURFACE = "resurface"
-    DROP = "dropped by the outer hull"
+    DROP = "drop"
     REFUSE = "refuse"
 
 

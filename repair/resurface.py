@@ -28,7 +28,7 @@ from patchwright.repair.network import PatchNetwork
 from patchwright.repair.patch_fit import Target, fit_group, samples_for
 from patchwright.repair.patch_nets import PatchNets, evaluate, sides
 from patchwright.repair.quad_layout import QuadLayout
-from patchwright.repair.spline_space import collocation
+from patchwright.repair.spline_space import collocation, uniform_collocation
 
 FIRST_CELLS = 2
 MOST_CELLS = 16
@@ -168,7 +168,7 @@ def _fit(layout: QuadLayout, edges: EdgeCurves, cells: IntArray, which: IntArray
         some = which[(cells[which] == (m, n)).all(axis=1)]
         fitted = fit_group(sides(layout, edges, some, (int(m), int(n))), (int(m), int(n)), target, method=method, noise=noise)
         groups.append((some, fitted.nets))
-        invented[some] = _mark(~fitted.found)
+        invented[some] = _mark(~fitted.data)
     if old is not None:
         rest = np.setdiff1d(np.arange(len(layout.quads)), which)
         for m, n in np.unique(old.nets.cells[rest], axis=0):
@@ -193,13 +193,16 @@ def _mark(missing: BoolArray) -> BoolArray:
 
 
 def _patch_errors(layout: QuadLayout, nets: PatchNets, which: IntArray, target: Target, invented: BoolArray) -> Array:
-    """(m,) largest distance from the data at edge midpoints and centres of the fit's cells (HJR 17), gaps left out."""
+    """(m,) largest distance from the data at corners, edge midpoints and centres of the fit's cells (HJR 17).
+
+    Samples on gaps are left out: there is nothing they should be near to.
+    """
     out = np.full(len(nets), np.nan)
     for m, n in np.unique(nets.cells[which], axis=0):
         some = which[(nets.cells[which] == (m, n)).all(axis=1)]
         nu, nv = samples_for(int(m)), samples_for(int(n))
-        us, vs = (np.arange(nu) + 0.5) / nu, (np.arange(nv) + 0.5) / nv
-        points = evaluate(nets.nets(some), collocation(int(m), us), collocation(int(n), vs))
+        us, vs = np.linspace(0.0, 1.0, 2 * nu + 1), np.linspace(0.0, 1.0, 2 * nv + 1)
+        points = evaluate(nets.nets(some), uniform_collocation(int(m), 2 * nu + 1), uniform_collocation(int(n), 2 * nv + 1))
         closest = target.tree.closest(points.reshape(-1, 3))
         distance = closest.distance.copy()
         distance[target.invented[closest.triangle]] = 0.0

@@ -1,0 +1,168 @@
+"""Kernels of bridging: the cheapest triangulation of one loop and the cheapest strip between two."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from patchwright.models.arrays import Array, BoolArray, IntArray
+
+SPREAD = 0.05  # weight of the squared length of inner edges: between equal areas the compact triangles win
+
+
+@njit(cache=True)
+def _normal(p: Array, q: Array, r: Array, out: Array) -> float:
+    """Unit normal of a triangle into `out`, returns its area."""
+    ax, ay, az = q[0] - p[0], q[1] - p[1], q[2] - p[2]
+    bx, by, bz = r[0] - p[0], r[1] - p[1], r[2] - p[2]
+    out[0] = ay * bz - az * by
+    out[1] = az * bx - ax * bz
+    out[2] = ax * by - ay * bx
+    size = np.sqrt(out[0] ** 2 + out[1] ** 2 + out[2] ** 2)
+    if size > 0.0:
+        out[0] /= size
+        out[1] /= size
+        out[2] /= size
+    return 0.5 * size
+
+
+@njit(cache=True)
+def _square(p: Array, q: Array) -> float:
+    return (p[0] - q[0]) ** 2 + (p[1] - q[1]) ** 2 + (p[2] - q[2]) ** 2
+
+
+@njit(cache=True)
+def _turn(n: Array, k: Array) -> float:
+    """1 - cos of the angle between two normals; 0 where one of them is missing."""
+    if (n[0] == 0.0 and n[1] == 0.0 and n[2] == 0.0) or (k[0] == 0.0 and k[1] == 0.0 and k[2] == 0.0):
+        return 0.0
+    return 1.0 - (n[0] * k[0] + n[1] * k[1] + n[2] * k[2])
+
+
+@njit(cache=True)
+def fill_loop(points: Array, normals: Array, forbidden: BoolArray) -> IntArray:
+    """Triangulate a loop at least cost by dynamic programming over its sub-loops; empty when there is no way.
+
+    `points` (n, 3) run along the rim as its triangles do, `normals` (n, 3) belong to the triangle at edge i -> i + 1,
+    `forbidden` (n, n) chords that the surface already uses. The cost is the area plus, for every edge, its squared
+    length times the turn of the normals across it. Returns (n - 2, 3) indices, running against the rim.
+    """
+    n = len(points)
+    cost = np.full((n, n), np.inf)
+    split = np.full((n, n), -1, dtype=np.int64)
+    facing = np.zeros((n, n, 3))
+    mine = np.zeros(3)
+    for i in range(n - 1):
+        cost[i, i + 1] = 0.0
+        facing[i, i + 1] = normals[i]
+    for span in range(2, n):
+        for i in range(n - span):
+            j = i + span
+            if forbidden[i, j] and span < n - 1:
+                continue
+            best = np.inf
+            chord = _square(points[i], points[j])
+            for k in range(i + 1, j):
+                below = cost[i, k] + cost[k, j]
+                if below >= best:
+                    continue
+                area = _normal(points[i], points[j], points[k], mine)
+                total = below + area
+                total += 0.5 * _square(points[i], points[k]) * _turn(mine, facing[i, k])
+                total += 0.5 * _square(points[k], points[j]) * _turn(mine, facing[k, j])
+                if span == n - 1:
+                    total += 0.5 * chord * _turn(mine, normals[n - 1])
+                else:
+                    total += SPREAD * chord
+                if total < best:
+                    best = total
+                    split[i, j] = k
+            cost[i, j] = best
+            if split[i, j] >= 0:
+                _normal(points[i], points[j], points[split[i, j]], mine)
+                facing[i, j] = mine
+    if not np.isfinite(cost[0, n - 1]):
+        return np.empty((0, 3), dtype=np.int64)
+    triangles = np.empty((n - 2, 3), dtype=np.int64)
+    stack = np.empty((n, 2), dtype=np.int64)
+    stack[0, 0], stack[0, 1] = 0, n - 1
+    top, count = 1, 0
+    while top:
+        top -= 1
+        i, j = stack[top, 0], stack[top, 1]
+        if j - i < 2:
+            continue
+        k = split[i, j]
+        triangles[count, 0], triangles[count, 1], triangles[count, 2] = i, j, k
+        count += 1
+        stack[top, 0], stack[top, 1] = i, k
+        stack[top + 1, 0], stack[top + 1, 1] = k, j
+        top += 2
+    return triangles
+
+
+@njit(cache=True)
+def narrowest(points: Array, forbidden: BoolArray) -> tuple[int, int]:
+    """The chord (i, j) of a loop that is shortest for the length of rim it cuts off; (-1, -1) when there is none."""
+    n = len(points)
+    along = np.zeros(n + 1)
+    for i in range(n):
+        along[i + 1] = along[i] + np.sqrt(_square(points[i], points[(i + 1) % n]))
+    best = np.inf
+    bi = -1
+    bj = -1
+    for i in range(n):
+        for j in range(i + n // 8 + 2, n):
+            if n - (j - i) < n // 8 + 2 or forbidden[i, j]:
+                continue
+            arc = along[j] - along[i]
+            arc = min(arc, along[n] - arc)
+            if arc <= 0.0:
+                continue
+            score = np.sqrt(_square(points[i], points[j])) / arc
+            if score < best:
+                best = score
+                bi = i
+                bj = j
+    return bi, bj
+
+
+@njit(cache=True)
+def strip(p: Array, q: Array, p_normals: Array, q_normals: Array) -> tuple[float, IntArray]:
+    """The cheapest strip between an open polyline `p` (n + 1, 3) and `q` (m + 1, 3), both running the same way.
+
+    `p_normals` (n, 3), `q_normals` (m, 3) belong to the triangles at their edges. Returns the cost and the moves
+    (n + m,): 0 advances on p, 1 on q.
+    """
+    n, m = len(p) - 1, len(q) - 1
+    came = np.zeros((n + 1, m + 1), dtype=np.uint8)
+    row = np.full(m + 1, np.inf)
+    mine = np.zeros(3)
+    for i in range(n + 1):
+        left = np.inf
+        for j in range(m + 1):
+            best = np.inf
+            if i == 0 and j == 0:
+                best = 0.0
+            if i > 0 and np.isfinite(row[j]):
+                area = _normal(p[i], p[i - 1], q[j], mine)
+                best = row[j] + area * (1.0 + 2.0 * _turn(mine, p_normals[i - 1]))
+                came[i, j] = 0
+            if j > 0:
+                area = _normal(q[j - 1], q[j], p[i], mine)
+                other = left + area * (1.0 + 2.0 * _turn(mine, q_normals[j - 1]))
+                if other < best:
+                    best = other
+                    came[i, j] = 1
+            best += SPREAD * _square(p[i], q[j])
+            row[j] = best
+            left = best
+    moves = np.empty(n + m, dtype=np.int64)
+    i, j = n, m
+    for at in range(n + m - 1, -1, -1):
+        moves[at] = came[i, j]
+        if came[i, j] == 0:
+            i -= 1
+        else:
+            j -= 1
+    return row[m], moves

@@ -1,0 +1,115 @@
+"""Kernel of the rims: which stretch of which rim each sample of a rim faces."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from patchwright.models.arrays import Array, IntArray
+
+
+@njit(cache=True)
+def facing(
+    points: Array,
+    outward: Array,
+    loop: IntArray,
+    edge: IntArray,
+    span: Array,
+    place: Array,
+    offsets: IntArray,
+    begin: Array,
+    start: Array,
+    end: Array,
+    edge_outward: Array,
+    low: Array,
+    high: Array,
+    reach: Array,
+    near: float,
+    share: float,
+    cosine: float,
+    fold: float,
+    bend: float,
+) -> tuple[IntArray, Array]:
+    """The nearest rim edge each sample faces, -1 when none, and the distance to it.
+
+    Samples: `points`, `outward` (s, 3), `loop`, `edge` (s,) the loop and rim edge each lies on, `span` (s,) the length
+    of that edge, `place` (s,) the arc length up to it. Rim edges: `start`, `end`, `edge_outward` (e, 3), those of loop
+    l are offsets[l]:offsets[l + 1]; `begin` (e + 1,) the arc length up to each.
+    Loops: boxes `low`, `high` (l, 3), `reach` (l,) how far a sample of a loop looks for other loops.
+    `near`: so close, edges of other places face each other whatever their directions; within `share` of the edges'
+    length they do when the surface continues; else the way across must leave both surfaces within acos(`cosine`) of
+    straight ahead, and the surface must not turn by more than acos(`fold`) across. Two places of one rim must be at
+    least `bend` times farther apart along it than across: the sides of a mere corner do not face each other.
+    """
+    count = len(points)
+    found = np.full(count, -1, dtype=np.int64)
+    way = np.full(count, np.inf)
+    loops = len(reach)
+    candidates = np.empty(loops, dtype=np.int64)
+    current = -1
+    total = 0
+    for s in range(count):
+        own = loop[s]
+        if own != current:
+            current = own
+            total = 0
+            for other in range(loops):
+                apart = 0.0
+                for k in range(3):
+                    step = max(low[own, k] - high[other, k], low[other, k] - high[own, k])
+                    if step > 0.0:
+                        apart += step * step
+                if other == own or apart <= reach[own] * reach[own]:
+                    candidates[total] = other
+                    total += 1
+        px, py, pz = points[s, 0], points[s, 1], points[s, 2]
+        ox, oy, oz = outward[s, 0], outward[s, 1], outward[s, 2]
+        first, last = offsets[own], offsets[own + 1]
+        size = last - first
+        around = begin[last] - begin[first]
+        for c in range(total):
+            other = candidates[c]
+            limit = min(way[s], reach[own]) if other != own else way[s]
+            apart = 0.0
+            for k in range(3):
+                step = max(low[other, k] - points[s, k], points[s, k] - high[other, k])
+                if step > 0.0:
+                    apart += step * step
+            if apart > limit * limit:
+                continue
+            for e in range(offsets[other], offsets[other + 1]):
+                if e == edge[s]:
+                    continue
+                ax, ay, az = start[e, 0], start[e, 1], start[e, 2]
+                bx, by, bz = end[e, 0] - ax, end[e, 1] - ay, end[e, 2] - az
+                square = bx * bx + by * by + bz * bz
+                t = 0.0
+                if square > 0.0:
+                    t = min(1.0, max(0.0, ((px - ax) * bx + (py - ay) * by + (pz - az) * bz) / square))
+                dx, dy, dz = ax + t * bx - px, ay + t * by - py, az + t * bz - pz
+                distance = np.sqrt(dx * dx + dy * dy + dz * dz)
+                if distance >= limit:
+                    continue
+                ux, uy, uz = edge_outward[e, 0], edge_outward[e, 1], edge_outward[e, 2]
+                turn = -(ox * ux + oy * uy + oz * uz)
+                beside = False
+                if other == own:
+                    steps = abs(e - edge[s])
+                    beside = steps == 1 or steps == size - 1
+                    along = abs(begin[e] + t * (begin[e + 1] - begin[e]) - place[s])
+                    if min(along, around - along) < bend * distance:
+                        continue
+                meets = False
+                if not beside and distance <= near:
+                    meets = True
+                elif not beside and distance <= share * max(span[s], np.sqrt(square)) and turn >= 0.5:
+                    meets = True
+                elif turn >= fold:
+                    ahead = ox * dx + oy * dy + oz * dz
+                    met = -(ux * dx + uy * dy + uz * dz)
+                    meets = ahead >= cosine * distance and met >= cosine * distance
+                if meets:
+                    limit = distance
+                    way[s] = distance
+                    found[s] = e
+    return found, way

@@ -1,0 +1,92 @@
+"""Edges: vertices that are not merged, edges used too often, and free edges as a function of tolerance."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from patchwright.models.arrays import IntArray
+from patchwright.repair.checks.examination import Examination, box_of
+from patchwright.repair.checks.regions import plural, regional
+from patchwright.repair.checks.registry import Finding, check
+from patchwright.repair.diagnosis import Defect
+
+SHARES = (0.0, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3)  # of the diagonal: where the free-edge curve is read
+
+
+@check("edges", looks="mesh", kinds=("open-edge", "non-manifold-edge"))
+def edges(exam: Examination) -> Finding:
+    """Unmerged vertices, edges with three triangles or more, and the free-edge curve."""
+    open_edges = exam.open_edges
+    many = exam.adjacency.non_manifold
+    figures = {
+        "open_edges": open_edges,
+        "non_manifold_edges": int(np.count_nonzero(many)),
+        "watertight": open_edges == 0 and not bool(many.any()) and len(exam.raw) > 0,
+        "free_edges_by_tolerance": _curve(exam),
+        "weld_distance": exam.weld_distance[0],
+        "weld_reason": exam.weld_distance[1],
+        "open_edges_after_welding": int(np.count_nonzero(exam.body_adjacency.free)),
+    }
+    return Finding((*_unmerged(exam), *_non_manifold(exam)), figures)
+
+
+def _curve(exam: Examination) -> list[dict[str, float | int]]:
+    """Free edges after welding at each of `SHARES` of the diagonal."""
+    from patchwright.repair.weld import free_edge_curve
+
+    distances = np.array(SHARES) * exam.diagonal
+    counts = free_edge_curve(exam.raw, distances) if exam.open_edges else np.zeros(len(SHARES), dtype=np.int64)
+    return [
+        {"share": share, "distance": float(distance), "free_edges": int(count)}
+        for share, distance, count in zip(SHARES, distances, counts, strict=True)
+    ]
+
+
+def _unmerged(exam: Examination) -> tuple[Defect, ...]:
+    """One defect for all the copies of points that a weld would merge."""
+    left = int(np.count_nonzero(exam.body_adjacency.free))
+    distance, reason = exam.weld_distance
+    closed = exam.open_edges - left
+    if closed <= 0 or distance <= 0.0:
+        return ()
+    triangles, points = exam.merged.triangles, exam.merged.vertices
+    which, corner = np.nonzero(exam.adjacency.free[exam.adjacency.triangle_edges])
+    tail, head = triangles[which, corner], triangles[which, (corner + 1) % 3]
+    # the free edges whose ends moved together in the weld are those that closed
+    after = exam.welded.triangles
+    still = edge_keys(after[which, corner], after[which, (corner + 1) % 3], len(exam.welded.vertices))
+    body = exam.body_adjacency.edges[exam.body_adjacency.free]
+    healed = ~np.isin(still, edge_keys(body[:, 0], body[:, 1], len(exam.welded.vertices)))
+    if not healed.any():
+        return ()
+    place = points[np.stack([tail, head], axis=1)[healed]]
+    box = box_of(place)
+    message = (
+        f"vertices are not merged: {plural(exam.open_edges, 'free edge')}, {left} remain after welding at "
+        f"{exam.length(distance)} ({reason})"
+    )
+    size = float(np.linalg.norm(box[1] - box[0]))
+    parts = exam.parts_of(which[healed])
+    return (Defect("open-edge", "error", place.mean(axis=(0, 1)), size, parts, int(healed.sum()), message, box),)
+
+
+def _non_manifold(exam: Examination) -> list[Defect]:
+    """Edges with three triangles or more once doubles are left out."""
+    many = exam.body_adjacency.non_manifold
+    if not many.any():
+        return []
+    index = np.flatnonzero(many)
+    pairs = exam.body_adjacency.edges[index]
+    offsets, around = exam.body_adjacency.edge_triangles
+    owner = exam.body_index[np.asarray(around)[offsets[index]]]
+    use = int(exam.body_adjacency.use_count[index].max())
+
+    def say(count: int, size: float) -> str:
+        return f"{plural(count, 'edge')} shared by more than two triangles (up to {use}), over {exam.length(size)}"
+
+    return regional(exam, "non-manifold-edge", "error", pairs, exam.body.vertices[pairs], owner, say)
+
+
+def edgeedge_keys(start: IntArray, end: IntArray, count: int) -> IntArray:
+    """One number per undirected edge."""
+    return np.minimum(start, end) * count + np.maximum(start, end)

@@ -1,0 +1,160 @@
+"""`Examination`: a model under diagnosis, with everything more than one check needs, computed once when first asked for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from patchwright.models.adjacency import Adjacency
+from patchwright.models.arrays import Array, BoolArray, IntArray
+from patchwright.models.assembly import Assembly
+from patchwright.models.tolerance import Tolerance
+from patchwright.models.triangulation import Triangulation
+
+if TYPE_CHECKING:
+    from patchwright.repair.orient import Oriented
+    from patchwright.repair.rims import Rim
+
+
+@dataclass(frozen=True, eq=False)
+class Examination:
+    """One model and its derived states; none of them changes the model.
+
+    The states, each with the triangles of the one before: `merged` (vertices with equal coordinates are one), `welded`
+    (copies of a point within the distance the data shows are one), `body` (collapsed and doubled triangles left out;
+    `body_index` are the rest), `oriented` (as few triangles reversed as a consistent, outward orientation takes).
+    """
+
+    assembly: Assembly
+    tolerance: Tolerance
+
+    @cached_property
+    def raw(self) -> Triangulation:
+        """All parts, tagged by part."""
+        return self.assembly.triangulation
+
+    @cached_property
+    def merged(self) -> Triangulation:
+        """Vertices with equal coordinates merged."""
+        from patchwright.repair.weld import weld
+
+        return weld(self.raw, 0.0).triangulation
+
+    @cached_property
+    def adjacency(self) -> Adjacency:
+        """Of `merged`."""
+        return Adjacency.of(self.merged)
+
+    @cached_property
+    def open_edges(self) -> int:
+        """Free edges of `merged`."""
+        return int(np.count_nonzero(self.adjacency.free))
+
+    @cached_property
+    def weld_distance(self) -> tuple[float, str]:
+        """The distance at which copies of one point are merged, and why; 0 when nothing is open."""
+        from patchwright.repair.weld import weld_distance
+
+        if not self.open_edges:
+            return 0.0, "no edge is free"
+        return weld_distance(self.raw, self.tolerance)
+
+    @cached_property
+    def welded(self) -> Triangulation:
+        """Copies of one point merged."""
+        from patchwright.repair.weld import weld
+
+        distance = self.weld_distance[0]
+        return weld(self.raw, distance).triangulation if distance > 0.0 else self.merged
+
+    @cached_property
+    def collapsed(self) -> BoolArray:
+        """(m,) triangles of `welded` that use one vertex twice."""
+        a, b, c = self.welded.triangles.T
+        return np.asarray((a == b) | (b == c) | (c == a))
+
+    @cached_property
+    def duplicate(self) -> BoolArray:
+        """(m,) triangles of `welded` over the same three vertices as an earlier one."""
+        key = np.sort(self.welded.triangles, axis=1)
+        order = np.lexsort((np.arange(len(key)), key[:, 2], key[:, 1], key[:, 0]))
+        again = np.zeros(len(key), dtype=np.bool_)
+        again[order[1:]] = (key[order[1:]] == key[order[:-1]]).all(axis=1)
+        return again & ~self.collapsed
+
+    @cached_property
+    def body_index(self) -> IntArray:
+        """(b,) the triangles that are neither collapsed nor doubles of another."""
+        return np.flatnonzero(~self.collapsed & ~self.duplicate)
+
+    @cached_property
+    def body(self) -> Triangulation:
+        """`welded` without collapsed and doubled triangles."""
+        return self.welded if len(self.body_index) == len(self.welded) else self.welded.take(self.body_index)
+
+    @cached_property
+    def body_adjacency(self) -> Adjacency:
+        """Of `body`."""
+        same = self.body is self.merged
+        return self.adjacency if same else Adjacency.of(self.body)
+
+    @cached_property
+    def component(self) -> IntArray:
+        """(b,) label of each triangle of `body`, connected through edges."""
+        return np.asarray(self.body_adjacency.components(), dtype=np.int64)
+
+    @cached_property
+    def component_closed(self) -> BoolArray:
+        """(c,) components of `body` without a free edge."""
+        open_triangle = self.body_adjacency.free[self.body_adjacency.triangle_edges].any(axis=1)
+        return np.bincount(self.component, weights=open_triangle) == 0
+
+    @cached_property
+    def oriented(self) -> Oriented:
+        """`body` with a consistent, outward orientation."""
+        from patchwright.repair.orient import orient
+
+        return orient(self.body)
+
+    @cached_property
+    def rims(self) -> tuple[Rim, ...]:
+        """The rims of `oriented`."""
+        from patchwright.repair.rims import classify_rims
+
+        turned = self.oriented.flipped.any()
+        adjacency = Adjacency.of(self.oriented.triangulation) if turned else self.body_adjacency
+        return classify_rims(self.oriented.triangulation, adjacency, self.tolerance)
+
+    @cached_property
+    def junctions(self) -> IntArray:
+        """(k, 3) vertex, triangle of `oriented` and its edge 0..2 the vertex lies on, along the rims."""
+        from patchwright.repair.checks.junctions import find_junctions
+
+        return find_junctions(self)
+
+    @cached_property
+    def diagonal(self) -> float:
+        """Diagonal of the model's box."""
+        return self.assembly.diagonal
+
+    def parts_of(self, triangles: IntArray) -> tuple[str, ...]:
+        """Names of the parts some triangles (indices into `raw`) lie in."""
+        tags = self.raw.tags
+        if tags is None or not self.raw.tag_names:
+            return ()
+        return tuple(self.raw.tag_names[k] for k in np.unique(tags[triangles]))
+
+    def length(self, value: float) -> str:
+        """A length in words: the number, the unit when it is known, and its share of the diagonal."""
+        unit = "" if self.assembly.unit == "unknown" else f" {self.assembly.unit}"
+        share = value / self.diagonal if self.diagonal > 0.0 else 0.0
+        return f"{value:.3g}{unit} ({share:.2g} of the diagonal)"
+
+
+def box_of(points: Array) -> Array:
+    """(2, 3) box of some points (..., 3)."""
+    flat = np.asarray(points).reshape(-1, 3)
+    return np.stack([flat.min(axis=0), flat.max(axis=0)])

@@ -1,0 +1,112 @@
+"""Rims: gaps with their width, holes with their perimeter, openings that are kept."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from patchwright.models.arrays import Array, IntArray
+from patchwright.repair.checks.examination import Examination, box_of
+from patchwright.repair.checks.regions import MOST, plural
+from patchwright.repair.checks.registry import Finding, check
+from patchwright.repair.diagnosis import Defect
+from patchwright.repair.rims import Rim
+
+
+@check("rims", looks="mesh", kinds=("gap", "opening", "overlap"))
+def rims(exam: Examination) -> Finding:
+    """What is still open after welding: gaps and holes to be bridged, openings to be kept.
+
+    A seam whose sides coincide but are meshed differently is a t-junction, reported there and not here.
+    """
+    found = exam.rims
+    figures = {
+        "rims": len(found),
+        "gaps": sum(rim.kind == "gap" for rim in found),
+        "holes": sum(rim.kind == "hole" for rim in found),
+        "openings": sum(rim.kind == "opening" for rim in found),
+    }
+    if not found:
+        return Finding(figures=figures)
+    points = exam.body.vertices
+    seam = _coincident(exam, found)
+    groups = [group for group in rim_groups(found) if not all(seam[i] for i in group)]
+    defects = [_defect(exam, found, group, points) for group in groups]
+    return Finding(tuple(_most(exam, defects)), figures)
+
+
+def rim_groups(rims: tuple[Rim, ...]) -> list[list[int]]:
+    """Rims that face or run past each other, together; every other rim for itself."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    other = [rim.partner if rim.partner is not None else rim.overlaps for rim in rims]
+    partner = np.array([i if k is None else k for i, k in enumerate(other)], dtype=np.int64)
+    count = len(rims)
+    graph = coo_array((np.ones(count, dtype=np.int8), (np.arange(count), partner)), shape=(count, count))
+    _, label = connected_components(graph, directed=False)
+    order = np.argsort(label, kind="stable")
+    ends = np.cumsum(np.bincount(label))
+    return [group.tolist() for group in np.split(order, ends[:-1])]
+
+
+def describe(exam: Examination, some: list[Rim]) -> tuple[str, str, float, str]:
+    """Kind, severity, size and message of a group of rims."""
+    first = max(some, key=lambda rim: rim.perimeter)
+    if first.kind == "opening":
+        if first.overlaps is not None:
+            message = f"two open surfaces run past each other by {exam.length(first.width)} along {first.perimeter:.3g}"
+            return "overlap", "error", first.width, message
+        shape = f"planar to {first.planar:.2g}"
+        message = (
+            f"an opening {exam.length(first.diameter)} across, perimeter {first.perimeter:.4g}, {shape}: {first.reason}"
+        )
+        return "opening", "warning", first.diameter, message
+    if first.kind == "hole":
+        message = (
+            f"a hole with {plural(len(first.loop), 'edge')}, perimeter {exam.length(first.perimeter)}: {first.reason}"
+        )
+        return "gap", "error", first.diameter, message
+    between = f"between {len(some)} rims" if len(some) > 1 else "between the two sides of one rim"
+    along = 0.5 * sum(rim.perimeter for rim in some)
+    message = (
+        f"a gap {between}, {exam.length(first.width)} wide in the median and at most {first.widest:.3g}, "
+        f"{along:.4g} long: {first.reason}"
+    )
+    return "gap", "error", first.width, message
+
+
+def _defect(exam: Examination, found: tuple[Rim, ...], group: list[int], points: Array) -> Defect:
+    some = [found[i] for i in group]
+    kind, severity, size, message = describe(exam, some)
+    loops: IntArray = np.concatenate([rim.loop for rim in some])
+    weights = np.array([rim.perimeter for rim in some])
+    centre = np.average([rim.centre for rim in some], axis=0, weights=weights if weights.sum() > 0 else None)
+    triangles = exam.body_index[np.concatenate([rim.triangles for rim in some])]
+    edges = sum(len(rim.triangles) for rim in some)
+    return Defect(kind, severity, centre, size, exam.parts_of(triangles), edges, message, box_of(points[loops]))  # type: ignore[arg-type]
+
+
+def _coincident(exam: Examination, found: tuple[Rim, ...]) -> list[bool]:
+    """Which rims are gaps of no width with t-junctions on them."""
+    hits = exam.junctions
+    closed = [rim.kind == "gap" and rim.widest <= exam.tolerance.gap for rim in found]
+    if not len(hits) or not any(closed):
+        return [False] * len(found)
+    return closed
+
+
+def _most(exam: Examination, defects: list[Defect]) -> list[Defect]:
+    """The largest `MOST` of each kind; the rest summed up in one more."""
+    kept: list[Defect] = []
+    for kind in dict.fromkeys(defect.kind for defect in defects):
+        own = sorted((d for d in defects if d.kind == kind), key=lambda d: (-d.size, -d.count))
+        kept += own[:MOST]
+        rest = own[MOST:]
+        if rest:
+            box = np.stack([np.min([d.box[0] for d in rest], axis=0), np.max([d.box[1] for d in rest], axis=0)])
+            count = sum(d.count for d in rest)
+            message = f"{len(rest)} further places of this kind, each at most {exam.length(rest[0].size)}"
+            parts = tuple(dict.fromkeys(name for d in rest for name in d.parts))
+            where = np.mean([d.where for d in rest], axis=0)
+            kept.append(Defect(kind, rest[0].severity, where, rest[0].size, parts, count, message, box))
+    return kept

@@ -1,0 +1,261 @@
+"""Outer hull: closed bodies that overlap become one closed surface; what lies inside others goes, with a label.
+
+The union is exact (manifold3d, in float64): vertices of the input keep their coordinates to the last bit, triangles
+that no other body crosses stay as they are, and every piece knows the triangle it was cut from. Bodies that touch no
+other are handed through untouched. A body inside another that came facing inward is a cavity and stays.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from patchwright.models.arrays import Array, BoolArray, IntArray
+from patchwright.models.triangulation import Triangulation
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Inside:
+    """A connected piece of one body that the union dropped: which body, inside which other (-1 unknown)."""
+
+    body: int
+    inside: int
+    triangles: IntArray  # of the input; those at the rim of the piece are dropped in part only
+    area: float
+    where: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Hull:
+    """The union's outer surface.
+
+    Parameters
+    ----------
+    triangulation : pieces in the order of the triangles they come from
+    parents : (m,) int64, the input triangle each is or was cut from
+    cut : (m,) whether it is a piece only
+    inside : what was dropped
+    failed : one sentence for every group of bodies the union could not take; they are handed through as they came
+    """
+
+    triangulation: Triangulation
+    parents: IntArray
+    cut: BoolArray
+    inside: tuple[Inside, ...]
+    failed: tuple[str, ...]
+
+
+def outer_hull(triangulation: Triangulation, body: IntArray, inward: BoolArray | None = None) -> Hull:
+    """Unite the closed, outward bodies; `body` (m,) labels them 0..b-1, `inward` (b,) those that came facing inward."""
+    count = len(triangulation)
+    bodies = int(body.max(initial=-1)) + 1
+    inward = np.zeros(bodies, dtype=np.bool_) if inward is None else inward
+    groups = _groups(triangulation, body, bodies)
+    vertices = [triangulation.vertices]
+    base = len(triangulation.vertices)
+    rows: list[IntArray] = []
+    parents: list[IntArray] = []
+    cuts: list[BoolArray] = []
+    inside: list[Inside] = []
+    failed: list[str] = []
+    for group in groups:
+        own = np.flatnonzero(np.isin(body, group))
+        made = None
+        if len(group) > 1:
+            try:
+                made = _unite(triangulation, body, group, inward)
+            except _Refused as refusal:
+                failed.append(str(refusal))
+        if made is None:
+            rows.append(triangulation.triangles[own])
+            parents.append(own)
+            cuts.append(np.zeros(len(own), dtype=np.bool_))
+            continue
+        points, triangles, parent = made
+        new_rows, new_points, cut = _rejoin(triangulation, points, triangles, parent, base)
+        vertices.append(new_points)
+        base += len(new_points)
+        rows.append(new_rows)
+        parents.append(parent)
+        cuts.append(cut)
+        inside += _dropped(triangulation, body, group, own, points, triangles, parent)
+    parent = np.concatenate(parents) if parents else np.zeros(0, dtype=np.int64)
+    order = np.argsort(parent, kind="stable")
+    parent = parent[order]
+    result = replace(
+        triangulation,
+        vertices=np.concatenate(vertices),
+        triangles=np.concatenate(rows)[order] if rows else np.zeros((0, 3), dtype=np.int64),
+        uv=None,
+        tags=None if triangulation.tags is None else triangulation.tags[parent],
+    )
+    cut = np.concatenate(cuts)[order] if cuts else np.zeros(0, dtype=np.bool_)
+    assert count == 0 or len(result)
+    return Hull(result, parent, cut, tuple(inside), tuple(failed))
+
+
+class _Refused(Exception):
+    """The union does not take these bodies."""
+
+
+def _groups(triangulation: Triangulation, body: IntArray, bodies: int) -> list[IntArray]:
+    """Bodies whose bounding boxes chain together, in the order of their first body."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    if not bodies:
+        return []
+    corners = triangulation.corners
+    low, high = np.full((bodies, 3), np.inf), np.full((bodies, 3), -np.inf)
+    np.minimum.at(low, body, corners.min(axis=1))
+    np.maximum.at(high, body, corners.max(axis=1))
+    meets = ((low[:, None] <= high[None]) & (low[None] <= high[:, None])).all(axis=2)
+    i, j = np.nonzero(meets)
+    _, label = connected_components(coo_array((np.ones(len(i)), (i, j)), shape=(bodies, bodies)), directed=False)
+    return [np.flatnonzero(label == k) for k in range(int(label.max()) + 1)]
+
+
+def _unite(
+    triangulation: Triangulation, body: IntArray, group: IntArray, inward: BoolArray
+) -> tuple[Array, IntArray, IntArray]:
+    """Points, triangles and parents of the union of some bodies."""
+    import manifold3d
+
+    solids, cavities = [], []
+    index: dict[int, IntArray] = {}
+    for b in group:
+        own = np.flatnonzero(body == b)
+        used, local = np.unique(triangulation.triangles[own], return_inverse=True)
+        local = local.reshape(-1, 3)
+        number = int(manifold3d.Manifold.reserve_ids(1))
+        index[number] = own
+        mesh = manifold3d.Mesh64(
+            np.ascontiguousarray(triangulation.vertices[used]),
+            np.ascontiguousarray(local.astype(np.uint64)),
+            run_index=np.array([0, 3 * len(own)], dtype=np.uint64),
+            run_original_id=np.array([number], dtype=np.uint32),
+            face_id=np.arange(len(own), dtype=np.uint64),
+        )
+        solid = manifold3d.Manifold(mesh)
+        if solid.status() != manifold3d.Error.NoError:
+            raise _Refused(f"body {int(b)} with {len(own)} triangles is not a closed 2-manifold ({solid.status().name})")
+        (cavities if inward[b] else solids).append(solid)
+    whole = manifold3d.Manifold.batch_boolean(solids or cavities, manifold3d.OpType.Add)
+    if solids and cavities:
+        hollow = manifold3d.Manifold.batch_boolean(cavities, manifold3d.OpType.Add)
+        whole = manifold3d.Manifold.batch_boolean([whole, hollow], manifold3d.OpType.Subtract)
+    if whole.status() != manifold3d.Error.NoError or whole.num_tri() == 0:
+        raise _Refused(f"the union of {len(group)} bodies failed ({whole.status().name})")
+    mesh = whole.to_mesh64()
+    triangles = np.asarray(mesh.tri_verts).astype(np.int64)
+    runs = np.asarray(mesh.run_index).astype(np.int64) // 3
+    numbers = np.asarray(mesh.run_original_id)
+    face = np.asarray(mesh.face_id).astype(np.int64)
+    parent = np.empty(len(triangles), dtype=np.int64)
+    for number, start, stop in zip(numbers, runs[:-1], runs[1:], strict=True):
+        parent[start:stop] = index[int(number)][face[start:stop]]
+    return np.asarray(mesh.vert_properties)[:, :3].copy(), triangles, parent
+
+
+def _rejoin(
+    triangulation: Triangulation, points: Array, triangles: IntArray, parent: IntArray, base: int
+) -> tuple[IntArray, Array, BoolArray]:
+    """Triangles over the input's vertices where the union kept them, over new vertices from `base` on elsewhere."""
+    # a corner is the parent's own vertex when it has its coordinates
+    own = triangulation.triangles[parent]
+    old = np.full(len(points), -1, dtype=np.int64)
+    for k in range(3):
+        for j in range(3):
+            same = (points[triangles[:, k]] == triangulation.vertices[own[:, j]]).all(axis=1)
+            old[triangles[same, k]] = own[same, j]
+    # two vertices of the union at one place stay two
+    _, first = np.unique(old, return_index=True)
+    keep = np.zeros(len(points), dtype=np.bool_)
+    keep[first] = True
+    old[~keep] = -1
+    fresh = old < 0
+    number = old.copy()
+    number[fresh] = base + np.arange(int(np.count_nonzero(fresh)))
+    rows = number[triangles]
+    uncut = (np.sort(rows, axis=1) == np.sort(own, axis=1)).all(axis=1)
+    rows[uncut] = own[uncut]
+    turned = np.zeros(len(rows), dtype=np.bool_)
+    if uncut.any():
+        # a cavity's triangles are reversed by the subtraction
+        lead = np.argmax(own[uncut][:, :, None] == number[triangles[uncut]][:, None, :1], axis=1)[:, 0]
+        second = own[uncut][np.arange(int(uncut.sum())), (lead + 1) % 3]
+        turned[uncut] = second != number[triangles[uncut]][:, 1]
+    rows[turned] = rows[turned][:, ::-1]
+    return rows, points[fresh], ~uncut
+
+
+def _dropped(
+    triangulation: Triangulation,
+    body: IntArray,
+    group: IntArray,
+    own: IntArray,
+    points: Array,
+    triangles: IntArray,
+    parent: IntArray,
+) -> list[Inside]:
+    """The pieces the union dropped, one for each connected region of a body."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    a, b, c = points[triangles[:, 0]], points[triangles[:, 1]], points[triangles[:, 2]]
+    left = np.bincount(parent, 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1), minlength=len(triangulation))
+    areas = triangulation.areas
+    lost = np.zeros(len(triangulation), dtype=np.bool_)
+    lost[own] = left[own] < areas[own] * (1.0 - 1e-9)
+    index = np.flatnonzero(lost)
+    if not len(index):
+        return []
+    rows = triangulation.triangles[index]
+    used, local = np.unique(rows, return_inverse=True)
+    local = local.reshape(-1, 3)
+    graph = coo_array(
+        (np.ones(2 * len(local)), (np.repeat(local[:, 0], 2), local[:, 1:].reshape(-1))), shape=(len(used), len(used))
+    )
+    _, label = connected_components(graph, directed=False)
+    piece = label[local[:, 0]]
+    pieces = []
+    middle = triangulation.corners[index].mean(axis=1)
+    for k in np.unique(piece):
+        some = index[piece == k]
+        lost_area = areas[some] - left[some]
+        deep = some[np.argmax(lost_area / np.maximum(areas[some], np.finfo(float).tiny))]
+        where = np.average(middle[piece == k], axis=0, weights=np.maximum(lost_area, np.finfo(float).tiny))
+        pieces.append(
+            Inside(
+                int(body[deep]),
+                _container(triangulation, body, group, deep),
+                some,
+                float(lost_area.sum()),
+                where,
+            )
+        )
+    return pieces
+
+
+def _container(triangulation: Triangulation, body: IntArray, group: IntArray, triangle: int) -> int:
+    """The other body whose winding number around the triangle's centre is largest, -1 when none is near 1."""
+    point = triangulation.corners[triangle].mean(axis=0)
+    best, found = 0.5, -1
+    for b in group:
+        if b == body[triangle]:
+            continue
+        local = triangulation.corners[body == b] - point
+        length = np.linalg.norm(local, axis=2)
+        p, q, r = local[:, 0], local[:, 1], local[:, 2]
+        six = np.einsum("ij,ij->i", p, np.cross(q, r))
+        under = (
+            length.prod(axis=1)
+            + np.einsum("ij,ij->i", p, q) * length[:, 2]
+            + np.einsum("ij,ij->i", q, r) * length[:, 0]
+            + np.einsum("ij,ij->i", r, p) * length[:, 1]
+        )
+        winding = float(np.arctan2(six, under).sum() / (2.0 * np.pi))
+        if winding > best:
+            best, found = winding, int(b)
+    return found

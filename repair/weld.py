@@ -1,0 +1,298 @@
+"""Welding: corners that are copies of one point become one vertex, without folding, collapsing or joining skins.
+
+Copies with equal coordinates are merged first and keep them to the last bit. What is left is matched edge by edge, not
+point by point: two free edges are one edge when both their ends lie within the distance, one edge has one partner, near
+pairs go first, pairs that continue the surface go before pairs that fold back on it (so that the two skins of a thin
+trailing edge stay apart), and pairs of one tag go before pairs of two. No two corners of one triangle ever merge.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from patchwright.models.arrays import Array, IntArray
+from patchwright.models.errors import ParameterError
+from patchwright.models.tolerance import Tolerance
+from patchwright.models.triangulation import Triangulation
+
+REACH_SHARE = 0.5  # of an edge's length: copies of a point are nearer to each other than to the edge's other end
+ORIENTED = 0.2  # below this share of candidates that run the same way the triangles came oriented: they are chance
+PLATEAU = 3.0  # a tolerance this many times larger must find next to nothing more
+PLATEAU_GAIN = 0.01  # "next to nothing": this share of what was found
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Welded:
+    """A triangulation after welding: as many triangles in the same order, fewer vertices.
+
+    Parameters
+    ----------
+    triangulation : over the merged vertices; a triangle that came with two equal corners still has them
+    clusters : (n,) int64, the new vertex of each input vertex
+    merged : how many vertices disappeared
+    moved : how many input vertices lie elsewhere now
+    largest_move : the farthest any of them went, model length unit
+    noise : root mean square distance of a corner from its point, estimated from the scatter of the merged copies
+    """
+
+    triangulation: Triangulation
+    clusters: IntArray
+    merged: int
+    moved: int
+    largest_move: float
+    noise: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FreeEdges:
+    """The edges used by one triangle only, as that triangle runs them; all (e,) int64.
+
+    `start`, `end` and `apex` are its corners, `triangle` its index, `tag` its tag (0 without tags).
+    """
+
+    start: IntArray
+    end: IntArray
+    apex: IntArray
+    triangle: IntArray
+    tag: IntArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Pairs:
+    left: IntArray
+    right: IntArray
+    gap: Array
+    kind: IntArray
+
+
+def weld(triangulation: Triangulation, distance: float) -> Welded:
+    """Merge the copies of a point that lie within `distance` of each other (0: only equal ones).
+
+    Raises
+    ------
+    ParameterError : a distance that is negative or not finite.
+    """
+    if not (np.isfinite(distance) and distance >= 0.0):
+        raise ParameterError(f"the weld distance must be a length of at least 0, got {distance}")
+    first = exact_labels(triangulation.vertices)
+    root = first
+    if distance > 0.0 and len(triangulation):
+        for _ in range(3):
+            step = _weld_step(root, triangulation, distance)
+            if step is None:
+                break
+            root = step[root]
+    return _merge(triangulation, first, root)
+
+
+def contract_short(triangulation: Triangulation, length: float) -> Welded:
+    """Contract the free edges shorter than `length`: what is smaller than the noise cannot be told from it.
+
+    Triangles collapse by that and come back with two equal corners. No cluster grows wider than 1.5 times the length.
+    """
+    from patchwright.repair._weld_kernel import contract
+
+    first = exact_labels(triangulation.vertices)
+    points = triangulation.vertices
+    free = free_edges(first[triangulation.triangles], None)
+    size = np.linalg.norm(points[free.end] - points[free.start], axis=1)
+    short = np.flatnonzero(size < length)
+    short = short[np.argsort(size[short], kind="stable")]
+    root = contract(free.start[short], free.end[short], 1.5 * length, points)[first]
+    return _merge(triangulation, first, root)
+
+
+def exact_labels(vertices: Array) -> IntArray:
+    """(n,) index of the first vertex with the same coordinates (0.0 and -0.0 are the same)."""
+    from patchwright.repair._weld_kernel import merge_exact
+
+    return np.asarray(merge_exact((np.ascontiguousarray(vertices) + 0.0).view(np.int64)))
+
+
+def free_edge_curve(triangulation: Triangulation, distances: npt.ArrayLike) -> IntArray:
+    """How many edges are still used by one triangle only after welding within each of `distances` (k,).
+
+    One matching serves all distances: a pair counts from the distance on at which its ends meet.
+    """
+    wanted = np.atleast_1d(np.asarray(distances, dtype=np.float64))
+    free, gaps = _match_gaps(triangulation, float(wanted.max(initial=0.0)))
+    return free - 2 * np.searchsorted(np.sort(gaps), wanted * (1.0 + 1e-12), side="right").astype(np.int64)
+
+
+def weld_distance(triangulation: Triangulation, tolerance: Tolerance) -> tuple[float, str]:
+    """The weld distance the data itself shows, never below `tolerance.gap`, and why.
+
+    The number of free edges falls with the distance and then stays: the copies of a point are all found. That start of
+    a plateau is taken, if it moves no corner farther than the fit tolerance; what is farther apart is a gap.
+    """
+    most = 2.0 * tolerance.fit
+    free, gaps = _match_gaps(triangulation, PLATEAU * max(most, tolerance.gap))
+    gaps = np.sort(gaps)
+    floor = int(np.searchsorted(gaps, tolerance.gap, side="right"))
+    within = int(np.searchsorted(gaps, most * (1.0 + 1e-9), side="right"))
+    why = f"round-off for this size and place ({tolerance.gap:.3g})"
+    if within <= floor:
+        return tolerance.gap, f"{why}; no copies farther apart up to {most:.3g}"
+    beyond = np.searchsorted(gaps, PLATEAU * gaps[floor:within], side="right") - np.arange(floor + 1, within + 1)
+    found = np.arange(1, within - floor + 1)
+    flat = np.flatnonzero(beyond <= PLATEAU_GAIN * found)
+    if not len(flat):
+        return tolerance.gap, f"{why}; the number of free edges shows no plateau up to {most:.3g}"
+    at = int(np.searchsorted(gaps[floor:within], PLATEAU * gaps[floor + flat[0]], side="right")) - 1
+    share = 2.0 * (at + 1) / max(1, free - 2 * floor)
+    distance = float(gaps[floor + at]) * (1.0 + 1e-9)
+    if share < 0.05:
+        return tolerance.gap, f"{why}; only {share:.1%} of the free edges meet up to {distance:.3g}"
+    left = free - 2 * (floor + at + 1)
+    return distance, (
+        f"the number of free edges falls from {free} to {left} at {distance:.3g} and stays up to {PLATEAU * distance:.3g}"
+    )
+
+
+def _merge(triangulation: Triangulation, first: IntArray, root: IntArray) -> Welded:
+    """Put each cluster at the mean of its corners; `first` are the exact copies, which alone move nothing."""
+    points = triangulation.vertices
+    used = np.zeros(len(first), dtype=np.bool_)
+    used[triangulation.triangles] = True
+    kept, clusters = np.unique(root, return_inverse=True)
+    clusters = clusters.reshape(-1).astype(np.int64)
+    place = points[kept].copy()
+    # only clusters of different coordinates get a new place: the mean over the corners in use
+    inner = used & (root != first)
+    busy = np.zeros(len(kept), dtype=np.bool_)
+    busy[clusters[inner]] = True
+    members = used & busy[clusters]
+    uses = np.bincount(triangulation.triangles.reshape(-1), minlength=len(points)).astype(np.float64)
+    weight = np.where(members, uses, 0.0)
+    total = np.bincount(clusters, weights=weight, minlength=len(kept))
+    for axis in range(3):
+        mean = np.bincount(clusters, weights=weight * (points[:, axis] - place[clusters, axis]), minlength=len(kept))
+        place[:, axis] += np.divide(mean, total, out=np.zeros(len(kept)), where=busy & (total > 0.0))
+    move = np.linalg.norm(place[clusters] - points, axis=1)
+    scatter = float(np.sum(weight[members] * move[members] ** 2))
+    freedom = float(total[busy].sum() - busy.sum())
+    return Welded(
+        replace(triangulation, vertices=place, triangles=clusters[triangulation.triangles]),
+        clusters,
+        int(len(points) - len(kept)),
+        int(np.count_nonzero(move[used] > 0.0)),
+        float(move[used].max(initial=0.0)),
+        float(np.sqrt(scatter / freedom)) if freedom > 0.0 else 0.0,
+    )
+
+
+def free_edges(triangles: IntArray, tags: IntArray | None) -> FreeEdges:
+    """Edges used by exactly one triangle, collapsed triangles left out."""
+    a, b, c = triangles.T
+    whole = (a != b) & (b != c) & (c != a)
+    index = np.flatnonzero(whole)
+    corners = triangles[index]
+    start = corners.reshape(-1)
+    end = corners[:, [1, 2, 0]].reshape(-1)
+    apex = corners[:, [2, 0, 1]].reshape(-1)
+    key = np.minimum(start, end) * (int(triangles.max(initial=0)) + 1) + np.maximum(start, end)
+    order = np.argsort(key)
+    ordered = key[order]
+    single = np.ones(len(key), dtype=np.bool_)
+    same = ordered[1:] == ordered[:-1]
+    single[1:] &= ~same
+    single[:-1] &= ~same
+    pick = np.sort(order[single])
+    owner = index[pick // 3]
+    tag = np.zeros(len(pick), dtype=np.int64) if tags is None else tags[owner]
+    return FreeEdges(start[pick], end[pick], apex[pick], owner, tag)
+
+
+def _edge_pairs(points: Array, free: FreeEdges, distance: float) -> _Pairs:
+    """Candidate pairs of free edges in the order they should be tried."""
+    from patchwright.repair._weld_kernel import edge_candidates
+
+    partner, gap, kind = edge_candidates(
+        points[free.start], points[free.end], points[free.apex], free.tag, distance, REACH_SHARE
+    )
+    found = np.flatnonzero((partner >= 0) & ((kind & 5) != 5))  # folded and run the same way: a double, not a neighbour
+    left, right = found // partner.shape[1], partner.reshape(-1)[found]
+    gap, kind = gap.reshape(-1)[found], kind.reshape(-1)[found]
+    against = (kind & 4) > 0
+    if np.count_nonzero(against) < ORIENTED * len(kind):
+        left, right, gap, kind = left[~against], right[~against], gap[~against], kind[~against]
+    order = np.argsort(gap + kind * (2.0 * distance), kind="stable")
+    return _Pairs(left[order], right[order], gap[order], kind[order])
+
+
+def _around(triangles: IntArray, count: int) -> tuple[IntArray, IntArray]:
+    """Offsets (n + 1,) and triangles around each vertex."""
+    flat = triangles.reshape(-1)
+    offsets = np.zeros(count + 1, dtype=np.int64)
+    np.cumsum(np.bincount(flat, minlength=count), out=offsets[1:])
+    return offsets, np.argsort(flat, kind="stable") // 3
+
+
+def _match_gaps(triangulation: Triangulation, distance: float) -> tuple[int, Array]:
+    """The number of free edges among exactly merged vertices, and the distances of the pairs that match."""
+    from patchwright.repair._weld_kernel import match_edges
+
+    if not len(triangulation):
+        return 0, np.zeros(0)
+    points = triangulation.vertices
+    triangles = exact_labels(points)[triangulation.triangles]
+    free = free_edges(triangles, triangulation.tags)
+    if distance <= 0.0 or not len(free.start):
+        return len(free.start), np.zeros(0)
+    pairs = _edge_pairs(points, free, distance)
+    offsets, around = _around(triangles, len(points))
+    _, mate = match_edges(
+        pairs.left, pairs.right, pairs.kind, free.start, free.end, 1.5 * distance, points, triangles,
+        offsets, around,
+    )  # fmt: skip
+    e = np.flatnonzero(mate > np.arange(len(mate)))
+    f = mate[e]
+    a, b = points[free.start], points[free.end]
+    cross = np.maximum(np.linalg.norm(a[e] - b[f], axis=1), np.linalg.norm(b[e] - a[f], axis=1))
+    along = np.maximum(np.linalg.norm(a[e] - a[f], axis=1), np.linalg.norm(b[e] - b[f], axis=1))
+    return len(free.start), np.minimum(cross, along)
+
+
+def _weld_step(root: IntArray, triangulation: Triangulation, distance: float) -> IntArray | None:
+    """One round of edge matching, then of the rims' vertices; each vertex's new root, None when nothing merged."""
+    from patchwright.repair._weld_kernel import match_edges, match_points
+
+    points, triangles = triangulation.vertices, root[triangulation.triangles]
+    free = free_edges(triangles, triangulation.tags)
+    if not len(free.start):
+        return None
+    pairs = _edge_pairs(points, free, distance)
+    offsets, around = _around(triangles, len(points))
+    step, _ = match_edges(
+        pairs.left, pairs.right, pairs.kind, free.start, free.end, 1.5 * distance, points, triangles, offsets,
+        around,
+    )  # fmt: skip
+    triangles = step[triangles]
+    free = free_edges(triangles, triangulation.tags)
+    left, right = _point_pairs(points, free, distance)
+    if len(left):
+        offsets, around = _around(triangles, len(points))
+        step = match_points(left, right, 1.5 * distance, points, triangles, offsets, around)[step]
+    return None if np.array_equal(step, np.arange(len(step))) else step
+
+
+def _point_pairs(points: Array, free: FreeEdges, distance: float) -> tuple[IntArray, IntArray]:
+    """Pairs of rim vertices within `distance` and within a share of their own free edges, nearest first."""
+    from scipy.spatial import cKDTree
+
+    rim = np.unique(np.concatenate([free.start, free.end]))
+    if len(rim) < 2:
+        return rim[:0], rim[:0]
+    length = np.linalg.norm(points[free.end] - points[free.start], axis=1)
+    shortest = np.full(len(points), np.inf)
+    np.minimum.at(shortest, free.start, length)
+    np.minimum.at(shortest, free.end, length)
+    pairs = cKDTree(points[rim]).query_pairs(distance, output_type="ndarray").astype(np.int64)
+    left, right = rim[pairs[:, 0]], rim[pairs[:, 1]]
+    gap = np.linalg.norm(points[left] - points[right], axis=1)
+    near = gap <= REACH_SHARE * np.minimum(shortest[left], shortest[right])
+    order = np.argsort(gap[near], kind="stable")
+    return left[near][order], right[near][order]

@@ -1,0 +1,93 @@
+"""The patch chain on the exact sphere: convergence, exact joins, smooth joins, gaps, invariance."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from patchwright.models.tolerance import Tolerance
+from patchwright.repair.network_seams import measure
+from patchwright.repair.patch_fit import Target
+from patchwright.repair.resurface import resurface
+from quad_shapes import Marks, SphereTarget, sphere_layout
+
+
+def network_of(n, fit, radius=1.0, slit=0.0):
+    target = SphereTarget(radius, slit)
+    return resurface(sphere_layout(n, radius), Target(target, Marks(target)), Tolerance(1e-9, fit))
+
+
+def true_error(network, radius=1.0):
+    return np.abs(np.linalg.norm(network.nets.sample(41), axis=-1) - radius).max()
+
+
+@pytest.mark.parametrize("fit", [1e-2, 1e-3, 1e-4, 1e-5])
+def test_the_tolerance_is_met_and_the_stated_deviation_is_true(fit):
+    network = network_of(1, fit)
+    assert true_error(network) <= 1.5 * fit
+    assert network.deviation.max() == pytest.approx(true_error(network), rel=0.3, abs=1e-9)
+
+
+def test_twice_the_quads_bring_at_least_third_order():
+    errors = [true_error(network_of(n, 1.0)) for n in (1, 2, 4)]
+    assert errors[0] / errors[1] > 8
+    assert errors[1] / errors[2] > 4  # at four quads a side the vertex normals' error of first order begins to show
+
+
+def test_neighbours_meet_exactly_and_smoothly():
+    angles = []
+    for n in (1, 2, 4):
+        seams = measure(network_of(n, 1.0))
+        assert max(s.gap for s in seams) < 1e-14
+        assert {s.kind for s in seams} == {"smooth"}
+        angles.append(max(s.angle for s in seams))
+    assert angles[0] > 4 * angles[1] > 8 * angles[2]
+
+
+def test_joins_stay_exact_where_neighbours_have_different_pieces():
+    network = network_of(1, 1e-5, slit=0.2)
+    assert max(s.gap for s in measure(network)) < 1e-13
+
+
+def test_the_tessellation_is_closed_and_encloses_the_ball():
+    body = network_of(2, 1e-4).tessellate(8)
+    edges = np.sort(np.stack([body.triangles, np.roll(body.triangles, -1, axis=1)], axis=-1).reshape(-1, 2), axis=1)
+    assert (np.unique(edges, axis=0, return_counts=True)[1] == 2).all()
+    assert body.volume == pytest.approx(4 / 3 * np.pi, rel=5e-3)
+    assert (np.einsum("ij,ij->i", body.normals, body.corners.mean(axis=1)) > 0).all()
+
+
+def test_a_slit_is_filled_smoothly_and_marked_as_invented():
+    network = network_of(2, 1e-3, slit=0.2)  # twice the cells the marks can tell apart
+    assert true_error(network) < 2e-3
+    z = network.nets.sample(17)[:, 1::2, 1::2, 2]  # the middles of the 8 x 8 cells
+    assert network.invented[np.abs(z - 0.3) < 0.1].all()
+    assert not network.invented[np.abs(z - 0.3) > 0.3].any()
+
+
+@pytest.mark.parametrize("scale", [1e-3, 1e3])
+def test_scale_changes_nothing_but_the_scale(scale):
+    one, other = network_of(2, 1e-4), network_of(2, 1e-4 * scale, radius=scale)
+    assert np.allclose(other.nets.controls, scale * one.nets.controls, rtol=0, atol=1e-9 * scale)
+
+
+def test_the_grid_agrees_node_for_node_and_the_surfaces_with_the_nets():
+    network = network_of(2, 1e-3)
+    grid = network.grid(8)
+    nodes = np.concatenate([b.reshape(-1, 3) for b in grid.blocks])
+    distinct = len(np.unique(nodes, axis=0))
+    m, e, v = len(network), len(network.layout.edges), len(network.layout.vertices)
+    assert distinct == v + 7 * e + 49 * m
+    t = np.linspace(0, 1, 9)
+    for surface, block in zip(network.surfaces(), grid.blocks, strict=True):
+        assert np.allclose(surface.grid(t, t), block[:, :, 0], atol=1e-14)
+
+
+def test_the_topology_runs_every_pcurve_with_its_edge():
+    network = network_of(1, 1e-3)
+    topology, surfaces = network.topology(), network.surfaces()
+    assert (topology.use_counts() == 2).all()
+    t = np.linspace(0, 1, 7)
+    for surface, ((loop),) in zip(surfaces, topology.loops, strict=True):
+        for use in loop:
+            uv = use.pcurve(t)
+            assert np.allclose(surface(uv[:, 0], uv[:, 1]), topology.curves[use.edge](t), atol=1e-14)
