@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from patchwright.pipelines.study import Study
 
 DONE, FOUND, BAD_INPUT, INTERNAL = 0, 1, 2, 3
+INTERRUPTED = "interrupted; nothing half-written was left"
 
 app = typer.Typer(
     name="patchwright",
@@ -196,19 +197,12 @@ def _say_json(value: Any) -> None:
 def main() -> None:
     """Entry point of the console script."""
     global _stdout
-    import click
-
     if not any(word in ("--help", "-h") for word in sys.argv[1:]) and len(sys.argv) > 1:
         sys.stdout.flush()
         _stdout = os.dup(1)
         os.dup2(2, 1)
     try:
         code = typer.main.get_command(app).main(standalone_mode=False)
-    except click.exceptions.Abort:
-        code = 130
-    except click.exceptions.ClickException as error:
-        error.show()
-        code = BAD_INPUT
     except EngineError as error:
         code = _fail(str(error), INTERNAL)
     except GeometryError as error:
@@ -216,10 +210,15 @@ def main() -> None:
     except BrokenPipeError:
         code = DONE
     except KeyboardInterrupt:
-        code = _fail("interrupted; nothing half-written was left", 130)
+        code = _fail(INTERRUPTED, 130)
     except MemoryError:
         code = _fail("out of memory; try a coarser file or a larger machine", INTERNAL)
     except Exception as error:  # noqa: BLE001 - the one place where the unforeseen becomes a sentence
+        if hasattr(error, "show") and hasattr(error, "exit_code"):  # typer's usage errors, whichever click it runs on
+            error.show()
+            sys.exit(BAD_INPUT)
+        if type(error).__name__ == "Abort":
+            sys.exit(_fail(INTERRUPTED, 130))
         if os.environ.get("PATCHWRIGHT_TRACEBACK"):
             raise
         sentence = f"internal failure ({type(error).__name__}: {error}); set PATCHWRIGHT_TRACEBACK=1 and report the trace"

@@ -69,7 +69,7 @@ def _spots(study: Study) -> list[Scene]:
         where = np.asarray(defect.where)
         box = np.stack([where - reach / 2, where + reach / 2])
         near = (np.abs(body.corners.mean(axis=1) - where) < 1.5 * reach).all(axis=1)
-        scene = Scene(study.folder / f"defect-{number}.png", f"{defect.kind} at {_coordinates(where)}", box, zoom=1.0)
+        scene = Scene(study.folder / f"defect-{number}.png", f"{defect.kind} at {_coordinates(where)}", box)
         scene.surface(body.take(near).compact(), edges=True)
         if len(edges):
             scene.lines(edges[(np.abs(edges.mean(axis=1) - where) < 1.5 * reach).all(axis=1)], colour="#c03030", width=3.0)

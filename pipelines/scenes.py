@@ -27,7 +27,6 @@ class Scene:
     box: Array
     layers: list[dict[str, Any]] = field(default_factory=list)
     arrays: dict[str, Any] = field(default_factory=dict)
-    zoom: float = 1.25
 
     def surface(self, triangulation: Triangulation, *, values: Any = None, colours: Any = None, **options: Any) -> Scene:
         """Triangles in one colour, by `values` (m,) or by `colours` (m, 3) uint8."""
@@ -63,7 +62,7 @@ def draw_scenes(scenes: list[Scene]) -> str | None:
     for scene in scenes:
         scene.path.unlink(missing_ok=True)
     listing = [
-        {"path": str(s.path), "title": s.title, "box": np.asarray(s.box).tolist(), "layers": s.layers, "zoom": s.zoom} for s in scenes
+        {"path": str(s.path), "title": s.title, "box": np.asarray(s.box).tolist(), "layers": s.layers} for s in scenes
     ]
     arrays: dict[str, Any] = {}
     for scene in scenes:

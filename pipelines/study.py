@@ -26,7 +26,8 @@ class Study:
     """One model on its way through a recipe.
 
     `source` is the file (or "demo"); `folder` is where outputs go; `assembly` what was read; `before` and `after` the
-    diagnoses of input and output; `files` what has been written.
+    diagnoses of input and output; `files` what has been written; `truth` the comparison with the known shape of a
+    sample.
     """
 
     source: str
@@ -39,3 +40,4 @@ class Study:
     files: tuple[str, ...] = ()
     reports: tuple[StageReport, ...] = ()
     notes: tuple[str, ...] = ()
+    truth: dict[str, Any] = field(default_factory=dict)

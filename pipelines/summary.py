@@ -57,6 +57,9 @@ def study_lines(study: Study) -> list[str]:
             lines.append(f"  invented surface {100.0 * repaired.invented:.3g} % of the area")
         for key, value in repaired.figures.items():
             lines.append(f"  {key:<28} {_short(value)}")
+    if study.truth:
+        lines.append("  against the known truth")
+        lines += [f"    {key:<52} {_short(value)}" for key, value in study.truth.items()]
     lines += [f"  note: {note}" for note in study.notes]
     if study.files:
         lines.append(f"  written to {study.folder}/: {', '.join(study.files)}")
@@ -76,6 +79,8 @@ def study_json(study: Study) -> dict[str, Any]:
         "files": list(study.files),
         "notes": list(study.notes),
     }
+    if study.truth:
+        out["truth"] = study.truth
     if study.before is not None:
         out["before"] = study.before.to_json()
     if study.repaired is not None:

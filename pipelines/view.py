@@ -15,6 +15,8 @@ from typing import Any
 import numpy as np
 
 SIZE = (1400, 900)
+DIRECTION = (-1.0, -1.6, 0.9)  # from the model to the eye
+MARGIN = 1.12
 BACKGROUND = "#ffffff"
 
 
@@ -24,23 +26,37 @@ def draw_scene(scene: dict[str, Any], arrays: dict[str, Any], path: Path) -> Non
 
     plotter = pv.Plotter(off_screen=True, window_size=list(scene.get("size", SIZE)))
     plotter.set_background(BACKGROUND)
-    plotter.enable_anti_aliasing("ssaa")
+    plotter.enable_anti_aliasing("fxaa")
     for layer in scene["layers"]:
         _add(plotter, pv, layer, arrays)
     if scene.get("title"):
         plotter.add_text(scene["title"], font_size=11, color="#222222", position="upper_left")
-    direction = np.asarray(scene.get("direction", (-1.0, -1.6, 0.9)))
-    low, high = np.asarray(scene["box"][0]), np.asarray(scene["box"][1])
-    centre, reach = (low + high) / 2.0, max(float(np.linalg.norm(high - low)), 1e-300)
-    plotter.camera.focal_point = centre
-    plotter.camera.position = centre + 2.0 * reach * direction / np.linalg.norm(direction)
-    plotter.camera.up = (0.0, 0.0, 1.0)
-    plotter.reset_camera(bounds=[low[0], high[0], low[1], high[1], low[2], high[2]])
-    plotter.camera.zoom(scene.get("zoom", 1.25))
+    _aim(plotter, scene)
     beside = path.with_name(f".{path.name}.tmp.png")
     plotter.screenshot(str(beside))
     plotter.close()
     beside.replace(path)
+
+
+def _aim(plotter: Any, scene: dict[str, Any]) -> None:
+    """Parallel projection along the scene's direction, the box filling the picture."""
+    towards = np.asarray(scene.get("direction", DIRECTION), dtype=np.float64)
+    towards /= np.linalg.norm(towards)
+    right = np.cross([0.0, 0.0, 1.0], towards)
+    right /= np.linalg.norm(right)
+    up = np.cross(towards, right)
+    low, high = np.asarray(scene["box"], dtype=np.float64)
+    corners = np.array([[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
+    centre = (low + high) / 2.0
+    width, height = (float(np.ptp((corners - centre) @ axis)) for axis in (right, up))
+    reach = max(float(np.linalg.norm(high - low)), 1e-300)
+    plotter.camera.focal_point = centre
+    plotter.camera.position = centre + 3.0 * reach * towards
+    plotter.camera.up = up
+    plotter.camera.parallel_projection = True
+    aspect = scene.get("size", SIZE)[0] / scene.get("size", SIZE)[1]
+    plotter.camera.parallel_scale = max(0.5 * MARGIN * max(height, width / aspect), 1e-300)
+    plotter.camera.clipping_range = (1e-3 * reach, 10.0 * reach)
 
 
 def _add(plotter: Any, pv: Any, layer: dict[str, Any], arrays: dict[str, Any]) -> None:

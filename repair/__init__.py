@@ -4,7 +4,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from patchwright.repair.diagnose import diagnose
+    from patchwright.repair.diagnosing import diagnose
     from patchwright.repair.diagnosis import Defect, Diagnosis
     from patchwright.repair.ladder import repair
     from patchwright.repair.result import Repaired, Verdict
@@ -16,7 +16,7 @@ _HOMES = {
     "Diagnosis": "diagnosis",
     "Repaired": "result",
     "Verdict": "result",
-    "diagnose": "diagnose",
+    "diagnose": "diagnosing",
     "repair": "ladder",
 }
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-
 from patchwright.models.arrays import Array, BoolArray, IntArray
 
 SPREAD = 0.05  # weight of the squared length of inner edges: between equal areas the compact triangles win

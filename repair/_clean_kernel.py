@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-
 from patchwright.models.arrays import Array, BoolArray, IntArray
 
 
@@ -87,9 +86,7 @@ def sector_partners(
 
 
 @njit(cache=True)
-def fans(
-    triangles: IntArray, neighbours: IntArray, left: IntArray, right: IntArray, splits: BoolArray
-) -> IntArray:
+def fans(triangles: IntArray, neighbours: IntArray, left: IntArray, right: IntArray, splits: BoolArray) -> IntArray:
     """(m, 3) label of the fan each corner belongs to: corners of one vertex joined through shared edges.
 
     `left`, `right` are further pairs of triangles joined at an edge; only vertices of `splits` are told apart, all

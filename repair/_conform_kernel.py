@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-
 from patchwright.models.arrays import Array, IntArray
 
 
@@ -39,7 +38,7 @@ def nearest_edges(
                 break
             e = order[place]
             a, b, c = start[e], end[e], apex[e]
-            if v == a or v == b or v == c:
+            if v in (a, b, c):
                 continue
             ab = 0.0
             ap = 0.0

@@ -5,6 +5,22 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from patchwright.repair._surface_walk_kernel import inner
+
+
+@inner
+def squared(points, i, j):
+    return (points[i, 0] - points[j, 0]) ** 2 + (points[i, 1] - points[j, 1]) ** 2 + (points[i, 2] - points[j, 2]) ** 2
+
+
+@inner
+def straightness(points, i, j, k):
+    """Cosine of the turn at j on the way from i to k, 1 where there is no way."""
+    ax, ay, az = points[j, 0] - points[i, 0], points[j, 1] - points[i, 1], points[j, 2] - points[i, 2]
+    bx, by, bz = points[k, 0] - points[j, 0], points[k, 1] - points[j, 1], points[k, 2] - points[j, 2]
+    size = np.sqrt((ax * ax + ay * ay + az * az) * (bx * bx + by * by + bz * bz))
+    return (ax * bx + ay * by + az * bz) / size if size > 0.0 else 1.0
+
 
 @njit(cache=True, nogil=True)
 def settle_needles(order, neighbours, longest, height, threshold, normals):
@@ -25,7 +41,8 @@ def settle_needles(order, neighbours, longest, height, threshold, normals):
                 if other >= 0 and height[other] > 4.0 * height[i] and (best < 0 or height[other] > height[best]):
                     best = other
         if best >= 0:
-            normals[i] = normals[best]
+            for c in range(3):
+                normals[i, c] = normals[best, c]
 
 
 @njit(cache=True, nogil=True)
@@ -49,7 +66,9 @@ def filter_normals(triangles, offsets, fans, areas, noisy, width, rounds, normal
             size = np.sqrt(sx * sx + sy * sy + sz * sz)
             if size > 0.0:
                 normals[i, 0], normals[i, 1], normals[i, 2] = sx / size, sy / size, sz / size
-        old[:] = normals
+        for i in range(len(triangles)):
+            for c in range(3):
+                old[i, c] = normals[i, c]
 
 
 @njit(cache=True, nogil=True)
@@ -70,17 +89,15 @@ def grow_ends(points, ends, offsets, incident, strong, weak):
                 came = incident[a]
         while degree[p] == 1 and came >= 0:
             q = ends[came, 0] + ends[came, 1] - p
-            d = points[p] - points[q]
             best, straight = -1, 0.5
             for a in range(offsets[p], offsets[p + 1]):
                 e = incident[a]
                 if strong[e] or not weak[e]:
                     continue
                 r = ends[e, 0] + ends[e, 1] - p
-                f = points[r] - points[p]
-                size = np.sqrt((f * f).sum() * (d * d).sum())
-                if size > 0.0 and (f * d).sum() / size > straight:
-                    best, straight = e, (f * d).sum() / size
+                on = straightness(points, q, p, r)
+                if on > straight:
+                    best, straight = e, on
             if best < 0:
                 break
             strong[best] = True
@@ -152,7 +169,7 @@ def turning(points, starts, vertices, reach, turn):
             turn[i] = 1.0
             if (i == lo or i == hi) and not ring:
                 continue
-            p = points[vertices[i]]
+            p = vertices[i]
             back, ahead = p, p
             j = i
             for _ in range(n):
@@ -161,8 +178,8 @@ def turning(points, starts, vertices, reach, turn):
                     if not ring:
                         break
                     j = hi - 1
-                back = points[vertices[j]]
-                if ((back - p) ** 2).sum() >= reach * reach:
+                back = vertices[j]
+                if squared(points, back, p) >= reach * reach:
                     break
             j = i
             for _ in range(n):
@@ -171,18 +188,15 @@ def turning(points, starts, vertices, reach, turn):
                     if not ring:
                         break
                     j = lo + 1
-                ahead = points[vertices[j]]
-                if ((ahead - p) ** 2).sum() >= reach * reach:
+                ahead = vertices[j]
+                if squared(points, ahead, p) >= reach * reach:
                     break
-            a, b = p - back, ahead - p
-            size = np.sqrt((a * a).sum() * (b * b).sum())
-            if size > 0.0:
-                turn[i] = (a * b).sum() / size
+            turn[i] = straightness(points, back, p, ahead)
         # of several inner vertices within the reach only the sharpest turns
         for i in range(lo + 1, hi):
-            p = points[vertices[i]]
+            p = vertices[i]
             j = i + 1
-            while j < hi and ((points[vertices[j]] - p) ** 2).sum() < reach * reach:
+            while j < hi and squared(points, vertices[j], p) < reach * reach:
                 if turn[j] < turn[i]:
                     turn[i] = 1.0
                     break

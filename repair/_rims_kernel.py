@@ -29,6 +29,7 @@ def facing(
     cosine: float,
     fold: float,
     bend: float,
+    apart_share: float,
 ) -> tuple[IntArray, Array]:
     """The nearest rim edge each sample faces, -1 when none, and the distance to it.
 
@@ -39,7 +40,8 @@ def facing(
     `near`: so close, edges of other places face each other whatever their directions; within `share` of the edges'
     length they do when the surface continues; else the way across must leave both surfaces within acos(`cosine`) of
     straight ahead, and the surface must not turn by more than acos(`fold`) across. Two places of one rim must be at
-    least `bend` times farther apart along it than across: the sides of a mere corner do not face each other.
+    least `bend` times farther apart along it than across, and `apart_share` of its length: the sides of a mere corner
+    or of a saw's tooth do not face each other.
     """
     count = len(points)
     found = np.full(count, -1, dtype=np.int64)
@@ -97,12 +99,11 @@ def facing(
                     steps = abs(e - edge[s])
                     beside = steps == 1 or steps == size - 1
                     along = abs(begin[e] + t * (begin[e + 1] - begin[e]) - place[s])
-                    if min(along, around - along) < bend * distance:
+                    if min(along, around - along) < max(bend * distance, apart_share * around):
                         continue
                 meets = False
-                if not beside and distance <= near:
-                    meets = True
-                elif not beside and distance <= share * max(span[s], np.sqrt(square)) and turn >= 0.5:
+                close = share * max(span[s], np.sqrt(square)) if turn >= 0.5 else 0.0
+                if not beside and distance <= max(near, close):
                     meets = True
                 elif turn >= fold:
                     ahead = ox * dx + oy * dy + oz * dz
@@ -113,3 +114,38 @@ def facing(
                     way[s] = distance
                     found[s] = e
     return found, way
+
+
+@njit(cache=True)
+def nearest_other(
+    points: Array, owner: IntArray, start: Array, end: Array, of: IntArray
+) -> tuple[IntArray, Array, Array]:
+    """The chord of another curve nearest to each point: its index, the place along it in [0, 1], the distance.
+
+    `points` (k, 3) lie on curves `owner` (k,); chords `start`, `end` (c, 3) are of curves `of` (c,). Index -1 when
+    there is no other curve.
+    """
+    count = len(points)
+    chord = np.full(count, -1, dtype=np.int64)
+    place = np.zeros(count)
+    best = np.full(count, np.inf)
+    for s in range(count):
+        px, py, pz = points[s, 0], points[s, 1], points[s, 2]
+        least = np.inf
+        for e in range(len(of)):
+            if of[e] == owner[s]:
+                continue
+            ax, ay, az = start[e, 0] - px, start[e, 1] - py, start[e, 2] - pz
+            bx, by, bz = end[e, 0] - start[e, 0], end[e, 1] - start[e, 1], end[e, 2] - start[e, 2]
+            square = bx * bx + by * by + bz * bz
+            t = 0.0
+            if square > 0.0:
+                t = min(1.0, max(0.0, -(ax * bx + ay * by + az * bz) / square))
+            dx, dy, dz = ax + t * bx, ay + t * by, az + t * bz
+            distance = dx * dx + dy * dy + dz * dz
+            if distance < least:
+                least = distance
+                chord[s] = e
+                place[s] = t
+        best[s] = np.sqrt(least)
+    return chord, place, best

@@ -8,10 +8,13 @@ from __future__ import annotations
 
 from numba import njit
 
+# for functions that only kernels call: without the wrappers for Python, most of the time to compile is saved
+inner = njit(cache=True, nogil=True, no_cpython_wrapper=True, no_cfunc_wrapper=True)
+
 _MOST_STEPS = 2000
 
 
-@njit(cache=True, nogil=True)
+@inner
 def closest_on_triangle(px, py, pz, v, t, k):
     """Closest point of triangle `t[k]`: (x, y, z, place), place 0-2 corner, 3-5 edge, 6 inside (Ericson, 5.1.5)."""
     ax, ay, az = v[t[k, 0], 0], v[t[k, 0], 1], v[t[k, 0], 2]
@@ -53,7 +56,7 @@ def closest_on_triangle(px, py, pz, v, t, k):
     return ax + s * ux + r * wx, ay + s * uy + r * wy, az + s * uz + r * wz, 6
 
 
-@njit(cache=True, nogil=True)
+@inner
 def walk(px, py, pz, start, v, t, neighbours, blocked):
     """(x, y, z, triangle, squared distance) of the closest point reached from triangle `start`."""
     k = start

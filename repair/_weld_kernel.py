@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-
 from patchwright.models.arrays import Array, IntArray
 
 CANDIDATES = 6  # nearest free edges kept per free edge
@@ -260,7 +259,7 @@ def match_edges(
             c, d = _root(parent, start[f]), _root(parent, end[f])
         else:
             c, d = _root(parent, end[f]), _root(parent, start[f])
-        if a == d or b == c or a == b or c == d:
+        if a in (b, d) or c in (b, d):
             continue
         if a != c and not _may_join(a, c, limit, parent, follow, points, triangles, offsets, around):
             continue

@@ -3,8 +3,8 @@
 One loop gets the triangulation of least cost (area, and edge length squared times the turn of the normals across it)
 by dynamic programming, after G. Barequet, M. Sharir, Filling gaps in the boundary of a polyhedron, Comput. Aided Geom.
 Des. 12 (1995) 207, and P. Liepa, Filling holes in meshes, SGP 2003; their lexicographic (angle, area) weight is
-replaced by a sum, for which the dynamic programme is exact up to the choice of normals. A loop with too many points is cut at its
-narrowest places first. Two loops that face each other get the strip of least cost between them.
+replaced by a sum. A loop with too many points is cut at its narrowest places first. Two loops that face each other get
+the strip of least cost between them.
 """
 
 from __future__ import annotations
@@ -12,7 +12,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-
 from patchwright.models.adjacency import Adjacency
 from patchwright.models.arrays import Array, BoolArray, IntArray
 from patchwright.models.triangulation import Triangulation
@@ -21,6 +20,7 @@ LOOP_LIMIT = 160  # points of a loop that are triangulated in one go; the work g
 FACING = 0.3  # cosine: rims face each other when the way across leaves both surfaces ahead
 AGREE = 0.25  # cosine: normals across a gap agree
 SHARE = 0.6  # of a rim's length that must face the other rim
+ASKED = 600  # places of a rim that are asked what lies ahead
 WIDE = 0.5  # of the smaller rim's size: a wider void is not a gap
 
 
@@ -79,7 +79,7 @@ class Border:
     @property
     def lengths(self) -> Array:
         """(n,) lengths of its edges."""
-        return np.linalg.norm(np.roll(self.points, -1, axis=0) - self.points, axis=1)
+        return np.asarray(np.linalg.norm(np.roll(self.points, -1, axis=0) - self.points, axis=1))
 
     @property
     def width(self) -> float:
@@ -178,9 +178,7 @@ def bridge(
     tags = triangulation.tags
     if tags is not None:
         tags = np.concatenate([tags, tags[np.concatenate(parents)]])
-    result = replace(
-        triangulation, triangles=np.concatenate([triangulation.triangles, *corners]), uv=None, tags=tags
-    )
+    result = replace(triangulation, triangles=np.concatenate([triangulation.triangles, *corners]), uv=None, tags=tags)
     return Bridged(result, tuple(bridges), tuple(failed))
 
 
@@ -315,7 +313,7 @@ def _note(
 
 def _unit(vectors: Array) -> Array:
     length = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    return np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0.0)
+    return np.asarray(np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0.0))
 
 
 def inner_share(rim: Border) -> float:
@@ -325,10 +323,7 @@ def inner_share(rim: Border) -> float:
     """
     middles, lengths = rim.middles, rim.lengths
     n = len(middles)
-    if n > 600:
-        some = np.linspace(0, n - 1, 600).astype(np.int64)
-    else:
-        some = np.arange(n)
+    some = np.unique(np.linspace(0, n - 1, min(n, ASKED)).astype(np.int64))
     across = middles[None] - middles[some, None]
     way = np.linalg.norm(across, axis=2)
     ahead = np.einsum("ijk,ik->ij", across, rim.outward[some])

@@ -8,9 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-
 from patchwright.models.adjacency import Adjacency
-from patchwright.models.arrays import IntArray
+from patchwright.models.arrays import BoolArray, IntArray
 from patchwright.models.triangulation import Triangulation
 
 
@@ -39,8 +38,8 @@ def drop_collapsed(triangulation: Triangulation) -> Cleaned:
 def drop_duplicates(triangulation: Triangulation) -> Cleaned:
     """Without doubled triangles (the same three vertices, either way round).
 
-    A patch of doubles keeps one copy where it closes a surface, and none where it is a wall inside: where the patch's
-    border edges already have their two triangles without it.
+    A patch of doubles keeps one copy where that closes a surface, and none where it is a wall or a fin without
+    thickness: where more of its border edges have their two triangles without it than lack one.
     """
     from patchwright.repair._orient_kernel import walk
 
@@ -74,7 +73,7 @@ def drop_duplicates(triangulation: Triangulation) -> Cleaned:
     uses = _use_count(base.triangles, patch.triangles)
     border = own.free[own.triangle_edges]
     walls = np.bincount(component, weights=(border & (uses == 2)).sum(axis=1))
-    seams = np.bincount(component, weights=(border & (uses != 2)).sum(axis=1))
+    seams = np.bincount(component, weights=(border & (uses == 1)).sum(axis=1))
     keep[patch_of[(walls > seams)[component]]] = False
     return _keep(triangulation, keep)
 
@@ -128,10 +127,10 @@ def _use_count(base: IntArray, asked: IntArray) -> IntArray:
     table = np.sort(key[: 3 * len(base)])
     wanted = key[3 * len(base) :]
     uses = np.searchsorted(table, wanted, side="right") - np.searchsorted(table, wanted, side="left")
-    return uses.reshape(-1, 3).astype(np.int64)
+    return np.asarray(uses.reshape(-1, 3), dtype=np.int64)
 
 
-def _keep(triangulation: Triangulation, keep: np.ndarray) -> Cleaned:  # type: ignore[type-arg]
+def _keep(triangulation: Triangulation, keep: BoolArray) -> Cleaned:
     if keep.all():
         return Cleaned(triangulation, np.arange(len(triangulation)), np.zeros(0, dtype=np.int64))
     kept = np.flatnonzero(keep)

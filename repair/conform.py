@@ -9,7 +9,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-
 from patchwright.models.arrays import BoolArray, IntArray
 from patchwright.models.triangulation import Triangulation
 from patchwright.repair.weld import free_edges

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-
 from patchwright.models.arrays import IntArray
 from patchwright.models.tree import Tree
 from patchwright.models.triangulation import Triangulation
+
+CROSSING = 1e-3  # of the round-off: edges that end nearer to the other triangle's plane touch it
 
 
 def crossing_pairs(triangulation: Triangulation, depth: float) -> IntArray:

@@ -49,6 +49,18 @@ class EdgeCurves:
             rows = self.offsets[which][:, None] + np.arange(cells + 3)
             yield int(cells), which, self.controls[rows]
 
+    def replaced(self, other: EdgeCurves, which: BoolArray) -> EdgeCurves:
+        """These curves with those of the mask (e,) taken from `other`; the rest stay bit for bit."""
+        cells = np.where(which, other.cells, self.cells)
+        offsets = np.concatenate([[0], np.cumsum(cells + 3)])
+        controls = np.empty((int(offsets[-1]), 3))
+        for source, mask in ((self, ~which), (other, which)):
+            for count in np.unique(cells[mask]):
+                edges = np.flatnonzero(mask & (cells == count))
+                span = np.arange(count + 3)
+                controls[offsets[edges][:, None] + span] = source.controls[source.offsets[edges][:, None] + span]
+        return EdgeCurves(frozen(cells, np.int64), frozen(offsets, np.int64), frozen(controls, np.float64))
+
     def refined(self, edges: IntArray, cells: int) -> Array:
         """(len(edges), cells + 3, 3) control points of the same curves in a space of `cells` pieces."""
         out = np.empty((len(edges), cells + 3, 3))

@@ -108,8 +108,17 @@ def find_features(triangulation: Triangulation, *, angle: float = 30.0, frozen: 
     return _chains(body, neighbours, normals, noise, edges, sides, kind, first, second)
 
 
-def _chains(body: Triangulation, neighbours: IntArray, normals: Array, noise: float, edges: IntArray, sides: IntArray,
-            kind: IntArray, first: IntArray, second: IntArray) -> Features:
+def _chains(
+    body: Triangulation,
+    neighbours: IntArray,
+    normals: Array,
+    noise: float,
+    edges: IntArray,
+    sides: IntArray,
+    kind: IntArray,
+    first: IntArray,
+    second: IntArray,
+) -> Features:
     """Curves through the feature edges (`kind` > 0), broken at branches, changes of kind and sharp turns."""
     from patchwright.repair import _feature_kernel as kernel
 
@@ -152,9 +161,18 @@ def _chains(body: Triangulation, neighbours: IntArray, normals: Array, noise: fl
     side_curve[picked] = chain
     on_sides = np.ascontiguousarray(side_curve[sides])
     return Features(
-        body, neighbours, normals, on_sides, kernel.regions(neighbours, on_sides), rows, vertices, along,
-        np.ascontiguousarray(np.stack([left[edge], right[edge]], axis=1)), kind[picked[walked[starts[:-1]]]],
-        np.flatnonzero(stop), noise,
+        body,
+        neighbours,
+        normals,
+        on_sides,
+        kernel.regions(neighbours, on_sides),
+        rows,
+        vertices,
+        along,
+        np.ascontiguousarray(np.stack([left[edge], right[edge]], axis=1)),
+        kind[picked[walked[starts[:-1]]]],
+        np.flatnonzero(stop),
+        noise,
     )
 
 
@@ -171,7 +189,9 @@ def _split_touching(triangulation: Triangulation, frozen: IntArray | None) -> tu
             f"a layout needs a 2-manifold, but {int(adjacency.non_manifold.sum())} edges have more than two triangles, one at {where}"
         )
     if adjacency.inconsistent.any():
-        raise GeometryError(f"{int(adjacency.inconsistent.sum())} edges have triangles that disagree on which side is outside")
+        raise GeometryError(
+            f"{int(adjacency.inconsistent.sum())} edges have triangles that disagree on which side is outside"
+        )
     triangles = triangulation.triangles
     m = len(triangles)
     t, k = np.nonzero(np.asarray(adjacency.neighbours) >= 0)

@@ -16,6 +16,7 @@ from patchwright.repair.quad_layout import QuadLayout
 from patchwright.repair.spline_space import collocation, greville, uniform_collocation
 
 FIELD_SAMPLES = 33  # parameters at which an edge's normal field is stored
+DAMPING = 0.02  # share of the wanted turn given up where the equations contradict each other
 
 # corner k of a quad as index of u and v
 CORNER_U, CORNER_V = np.array([0, 1, 1, 0]), np.array([0, 0, 1, 1])
@@ -202,7 +203,11 @@ def _follow(layout: QuadLayout, which: IntArray, nets: Array, cells: tuple[int, 
         row[~active], value[~active] = 0.0, 0.0
     matrix = np.concatenate([r[0] for r in rows], axis=1)
     value = np.concatenate(right, axis=1)
-    move = np.einsum("ksa,ka->ks", np.linalg.pinv(matrix, rcond=1e-8), value)
+    # damped least squares in units of the patch's own legs: where two sides want contradicting twists, nobody gets far
+    leg = np.concatenate([r[7] for r in rows], axis=1).mean(axis=1)
+    matrix *= leg[:, None, None]
+    normal_matrix = np.einsum("kas,kat->kst", matrix, matrix) + DAMPING**2 * np.eye(len(ring))
+    move = np.linalg.solve(normal_matrix, np.einsum("kas,ka->ks", matrix, value)[..., None])[..., 0] * leg[:, None]
     i, j = np.array(ring).T
     nets[:, i, j] += move[..., None] * direction
     return nets

@@ -50,16 +50,17 @@ def repair(assembly: Assembly | Triangulation, *, scope: str = "least", layout: 
         raise ParameterError(f"{model.source or 'the assembly'} holds no triangles and no faces: there is nothing to repair")
     limits = tolerance if isinstance(tolerance, Tolerance) else Tolerance.of(model, fit=tolerance)
     say = progress or (lambda label, share: None)
+    if diagnosis is None:
+        from patchwright.repair.diagnosing import diagnose
+
+        say("diagnosing", 0.0)
+        diagnosis = diagnose(model, tolerance=limits)
     if model.is_cad and scope == "least":
         from patchwright.repair.cad_route import repair_cad
 
-        return repair_cad(model, limits, openings=openings, progress=say)
-    from patchwright.repair.diagnose import diagnose
+        return repair_cad(model, limits, openings=openings, diagnosis=diagnosis, progress=say)
     from patchwright.repair.given_layout import layout_of
     from patchwright.repair.mesh_route import repair_mesh
 
-    if diagnosis is None:
-        say("diagnosing", 0.0)
-        diagnosis = diagnose(model, tolerance=limits)
     given = layout if isinstance(layout, str) else layout_of(layout, limits)
     return repair_mesh(model, limits, scope=scope, layout=given, openings=openings, clean=diagnosis.clean, progress=say)

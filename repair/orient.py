@@ -11,7 +11,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-
 from patchwright.models.adjacency import Adjacency
 from patchwright.models.arrays import Array, BoolArray, IntArray
 from patchwright.models.triangulation import Triangulation
@@ -88,9 +87,7 @@ def _volumes(
     start, end = triangles[which, edge], triangles[which, (edge + 1) % 3]
     owner = component[which]
     rim_count = np.maximum(np.bincount(owner, minlength=parts), 1)
-    middle = np.stack(
-        [np.bincount(owner, points[start, k], minlength=parts) / rim_count for k in range(3)], axis=1
-    )
+    middle = np.stack([np.bincount(owner, points[start, k], minlength=parts) / rim_count for k in range(3)], axis=1)
     apex = (middle - centre)[owner]
     p, q = points[start] - centre[owner], points[end] - centre[owner]
     fan = np.einsum("ij,ij->i", apex, np.cross(q, p))

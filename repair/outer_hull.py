@@ -8,11 +8,12 @@ other are handed through untouched. A body inside another that came facing inwar
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
-
 from patchwright.models.arrays import Array, BoolArray, IntArray
 from patchwright.models.triangulation import Triangulation
+from patchwright.repair.untangle import winding
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -122,7 +123,8 @@ def _unite(
     """Points, triangles and parents of the union of some bodies."""
     import manifold3d
 
-    solids, cavities = [], []
+    solids: list[Any] = []
+    cavities: list[Any] = []
     index: dict[int, IntArray] = {}
     for b in group:
         own = np.flatnonzero(body == b)
@@ -139,7 +141,9 @@ def _unite(
         )
         solid = manifold3d.Manifold(mesh)
         if solid.status() != manifold3d.Error.NoError:
-            raise _Refused(f"body {int(b)} with {len(own)} triangles is not a closed 2-manifold ({solid.status().name})")
+            raise _Refused(
+                f"body {int(b)} with {len(own)} triangles is not a closed 2-manifold ({solid.status().name})"
+            )
         (cavities if inward[b] else solids).append(solid)
     whole = manifold3d.Manifold.batch_boolean(solids or cavities, manifold3d.OpType.Add)
     if solids and cavities:
@@ -245,17 +249,7 @@ def _container(triangulation: Triangulation, body: IntArray, group: IntArray, tr
     for b in group:
         if b == body[triangle]:
             continue
-        local = triangulation.corners[body == b] - point
-        length = np.linalg.norm(local, axis=2)
-        p, q, r = local[:, 0], local[:, 1], local[:, 2]
-        six = np.einsum("ij,ij->i", p, np.cross(q, r))
-        under = (
-            length.prod(axis=1)
-            + np.einsum("ij,ij->i", p, q) * length[:, 2]
-            + np.einsum("ij,ij->i", q, r) * length[:, 0]
-            + np.einsum("ij,ij->i", r, p) * length[:, 1]
-        )
-        winding = float(np.arctan2(six, under).sum() / (2.0 * np.pi))
-        if winding > best:
-            best, found = winding, int(b)
+        around = winding(triangulation.corners[body == b], point)
+        if around > best:
+            best, found = around, int(b)
     return found

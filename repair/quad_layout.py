@@ -7,14 +7,23 @@ quads, all split once into quads only, then smoothed.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from time import perf_counter
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from patchwright.models.arrays import Array, BoolArray, IntArray, frozen
+from patchwright.models.arrays import Array, BoolArray, IntArray
+from patchwright.models.arrays import frozen as own_copy
 from patchwright.models.errors import ParameterError
 from patchwright.models.triangulation import Triangulation
 
+if TYPE_CHECKING:
+    from patchwright.repair.features import Features
+    from patchwright.repair.pairing import QuadMesh
+
 METHODS = ("pairs", "quadriflow")
+RETRIES = 3
+NEAR_TARGET = 1.15  # number of quads against the wanted one
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,14 +83,16 @@ class QuadLayout:
     def __post_init__(self) -> None:
         put = object.__setattr__
         for name in ("vertices", "path_points"):
-            put(self, name, frozen(getattr(self, name), np.float64))
+            put(self, name, own_copy(getattr(self, name), np.float64))
         for name in ("quads", "edges", "quad_edges", "edge_quads", "path_offsets", "triangle", "tags"):
-            put(self, name, frozen(getattr(self, name), np.int64))
+            put(self, name, own_copy(getattr(self, name), np.int64))
         for name in ("edge_reversed", "sharp", "boundary"):
-            put(self, name, frozen(getattr(self, name), np.bool_))
+            put(self, name, own_copy(getattr(self, name), np.bool_))
         m, e = len(self.quads), len(self.edges)
         if self.quads.shape != (m, 4) or self.quad_edges.shape != (m, 4) or self.edge_reversed.shape != (m, 4):
-            raise ParameterError(f"quads, quad_edges and edge_reversed must be (m, 4), got {self.quads.shape} for quads")
+            raise ParameterError(
+                f"quads, quad_edges and edge_reversed must be (m, 4), got {self.quads.shape} for quads"
+            )
         if len(self.path_offsets) != e + 1 or self.path_offsets[-1] != len(self.path_points):
             raise ParameterError(f"path_offsets must be ({e + 1},) and end at {len(self.path_points)} points")
 
@@ -98,7 +109,7 @@ def quad_layout(
     *,
     target: int | None = None,
     angle: float = 30.0,
-    frozen: BoolArray | None = None,
+    frozen: IntArray | None = None,
     method: str = "pairs",
 ) -> QuadLayout:
     """A layout found automatically.
@@ -106,15 +117,92 @@ def quad_layout(
     Parameters
     ----------
     triangulation : oriented 2-manifold, closed or with boundary
-    target : wanted number of quads, None takes it from size and curvature
+    target : wanted number of quads, reached within about a fifth; None takes it from size and curvature
     angle : degrees; edges that turn more are sharp and become edges of quads
-    frozen : (m,) bool, reserved
-    method : "pairs", or "quadriflow" (optional engine, features are not followed exactly)
+    frozen : (k, 2) vertex pairs of further edges that quads must follow, or None; method "pairs" only
+    method : "pairs", or "quadriflow" (optional engine; features are followed only roughly and are not marked)
 
     Raises
     ------
-    ParameterError : an unknown method, a target below 1.
+    ParameterError : an unknown method, a target below 1, an angle that is not between 0 and 180.
     GeometryError : the triangulation is empty, not 2-manifold or not oriented.
     EngineError : the optional engine failed.
     """
-    raise NotImplementedError
+    if method not in METHODS:
+        raise ParameterError(f"unknown layout method {method!r}; known are {', '.join(METHODS)}")
+    if target is not None and target < 1:
+        raise ParameterError(f"the target must be at least one quad, got {target}")
+    if not 0.0 < angle < 180.0:
+        raise ParameterError(f"the angle must lie between 0 and 180 degrees, got {angle}")
+    from patchwright.repair.features import find_features
+
+    begin = perf_counter()
+    features = find_features(triangulation, angle=angle, frozen=frozen)
+    if method == "quadriflow":
+        from patchwright.repair.quadriflow import quadriflow
+
+        quad_mesh = quadriflow(features, target)
+    else:
+        quad_mesh = _pairs(features, target)
+    return _finish(quad_mesh, features, begin)
+
+
+def _pairs(features: Features, target: int | None) -> QuadMesh:
+    """Coarse triangles paired and split; once more with corrected sizes where the number of quads is off."""
+    from patchwright.repair.pairing import pair
+    from patchwright.repair.quad_smooth import smooth
+    from patchwright.repair.remesh import remesh
+    from patchwright.repair.sizing import size_field
+
+    factor, best, error = 1.0, None, np.inf
+    for _ in range(RETRIES):
+        size, wanted = size_field(features, target=target, factor=factor)
+        quad_mesh = pair(remesh(features, 2.0 * size))
+        ratio = len(quad_mesh.quads) / wanted
+        if abs(np.log(ratio)) < error:
+            best, error = quad_mesh, abs(np.log(ratio))
+        if target is None or error < np.log(NEAR_TARGET):
+            break
+        factor *= np.sqrt(ratio)
+    assert best is not None
+    smooth(best)
+    return best
+
+
+def _finish(quad_mesh: QuadMesh, features: Features, begin: float) -> QuadLayout:
+    """Edges, paths, tags and the report of a quad mesh."""
+    from patchwright.repair.layout_paths import quad_tags, trace_paths
+    from patchwright.repair.quad_smooth import scaled_jacobians
+
+    own = trace_paths(quad_mesh, features)
+    vertices, quads = quad_mesh.mesh.X, quad_mesh.quads
+    quality = scaled_jacobians(quad_mesh)
+    degree = np.bincount(own.edges.reshape(-1), minlength=len(vertices))
+    special = np.zeros(len(vertices), dtype=bool)
+    special[own.edges[own.boundary].reshape(-1)] = True
+    body = features.body
+    sides = (3 * len(body) + int((features.neighbours < 0).sum())) // 2
+    report = LayoutReport(
+        irregular_vertices=int((degree[~special] != 4).sum()),
+        min_scaled_jacobian=float(quality.min()),
+        median_scaled_jacobian=float(np.median(quality)),
+        folded=int((quality <= 0.0).sum()),
+        feature_coverage=own.coverage,
+        euler=(len(vertices) - len(own.edges) + len(quads), len(body.vertices) - sides + len(body)),
+        elapsed=perf_counter() - begin,
+    )
+    return QuadLayout(
+        vertices,
+        quads,
+        own.edges,
+        own.quad_edges,
+        own.edge_reversed,
+        own.edge_quads,
+        own.sharp,
+        own.boundary,
+        own.path_offsets,
+        own.path_points,
+        quad_mesh.mesh.vt,
+        quad_tags(quad_mesh, features),
+        report,
+    )

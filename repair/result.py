@@ -33,7 +33,7 @@ class Rung(str, Enum):
 
     KEEP = "keep"
     WELD = "weld"
-    CUT = "cut"
+    CUT = "re-trim"
     BRIDGE = "bridge"
     RESURFACE = "resurface"
     DROP = "drop"

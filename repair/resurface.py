@@ -32,7 +32,8 @@ from patchwright.repair.spline_space import collocation, uniform_collocation
 
 FIRST_CELLS = 2
 MOST_CELLS = 16
-WORTH = 0.7  # twice the pieces must bring the error below this share of what it was, else they are not kept
+WORTH = 0.8  # twice the pieces must bring the error below this share of what it was, or they count as barren
+PATIENCE = 2  # barren doublings in a row after which a curve or patch is left as it is
 
 Progress = Callable[[str, float], None]
 
@@ -80,30 +81,29 @@ def resurface(layout: QuadLayout, target: Target, tolerance: Tolerance, *, metho
     edges = aligned(edges)
     state = _fit(layout, edges, patch_cells, everything, None, target, method, noise)
     rounds = int(np.log2(MOST_CELLS // FIRST_CELLS))
-    stuck_edges = np.zeros(len(layout.edges), dtype=bool)
-    stuck_patches = np.zeros(len(layout.quads), dtype=bool)
+    barren_edges = np.zeros(len(layout.edges), dtype=np.int64)
+    barren_patches = np.zeros(len(layout.quads), dtype=np.int64)
+    edge_error = _edge_errors(layout, edges, target)
     for turn in range(rounds):
         say("refining patches", (turn + 1) / (rounds + 1))
-        edge_error = _edge_errors(layout, edges, target)
-        finer_edges = (edge_error > tolerance.fit) & ~stuck_edges
-        if finer_edges.any():
-            wanted = np.where(finer_edges, np.asarray(edges.cells) * 2, edges.cells)
-            trial = aligned(_fit_edge_curves(layout, target, wanted))
-            stuck_edges |= finer_edges & (_edge_errors(layout, trial, target) > WORTH * edge_error)
-            # a curve that gained nothing keeps its old pieces
-            keep = np.where(stuck_edges, edges.cells, wanted)
-            edges = aligned(_fit_edge_curves(layout, target, keep))
-        changed = (edges.cells != state.edges.cells)[layout.quad_edges].any(axis=1)
-        poor = (state.error > tolerance.fit) & ~stuck_patches
+        finer = (edge_error > tolerance.fit) & (barren_edges < PATIENCE)
+        if finer.any():
+            cells = np.where(finer, np.asarray(edges.cells) * 2, edges.cells)
+            edges = edges.replaced(aligned(_fit_edge_curves(layout, target, cells)), finer)
+            error = _edge_errors(layout, edges, target)
+            barren_edges[finer] = np.where(error > WORTH * edge_error, barren_edges + 1, 0)[finer]
+            edge_error = error
+        changed = finer[layout.quad_edges].any(axis=1)
+        poor = (state.error > tolerance.fit) & (barren_patches < PATIENCE)
         if not (changed.any() or poor.any()):
             break
         own = np.asarray(edges.cells)[layout.quad_edges]
         needed = np.stack([own[:, [0, 2]].max(axis=1), own[:, [1, 3]].max(axis=1)], axis=1)
-        cells = np.maximum(np.where(poor[:, None], np.asarray(state.nets.cells) * 2, state.nets.cells), needed)
+        wanted = np.where(poor[:, None], np.asarray(state.nets.cells) * 2, state.nets.cells)
         redo = np.flatnonzero(changed | poor)
-        new = _fit(layout, edges, cells, redo, state, target, method, noise)
-        stuck_patches[redo] = poor[redo] & (new.error[redo] > WORTH * state.error[redo])
-        state = new
+        before = state.error
+        state = _fit(layout, edges, np.maximum(wanted, needed), redo, state, target, method, noise)
+        barren_patches[redo] = np.where(state.error > WORTH * before, barren_patches + 1, 0)[redo]
     say("joining patches", 0.95)
     fields = edge_fields(layout, side_normals(layout, state.nets), sectors)
     nets = follow_fields(layout, state.nets, fields)

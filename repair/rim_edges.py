@@ -13,6 +13,8 @@ FOLD = -0.2  # cosine: a missing edge or corner of a box turns the surface by 90
 WIDE = 0.5  # of the smaller rim's diameter: rims farther apart than that are not two sides of one gap
 SEAM = 0.1  # of the rim's edge length: closer, the way across is noise of the faceting
 BEND = 1.5  # arc to chord: a right-angled corner has 1.41, the two ends of a circle's diameter 1.57
+APART = 0.1  # of a rim's length: nearer along the rim, two of its places are the flanks of a tooth
+SMOOTH = 0.04  # of a rim's length: the way ahead is a mean over so much to both sides, or saw teeth face each other
 SAMPLES = (12, 400)  # fewest and most samples of one rim
 
 
@@ -102,11 +104,13 @@ def what_faces(edges: RimEdges, facts: LoopFacts, near: float, sense: float) -> 
     edge = np.clip(edge, edges.offsets[owner], edges.offsets[owner + 1] - 1)
     step = (place - begin[edge]) / np.maximum(edges.length[edge], np.finfo(float).tiny)
     points = edges.start[edge] + np.clip(step, 0.0, 1.0)[:, None] * (edges.end - edges.start)[edge]
-    outward = np.ascontiguousarray(sense * edges.outward)
+    everywhere, halfway = np.arange(len(edges.loop)), 0.5 * (begin[:-1] + begin[1:])
+    outward = sense * _way_ahead(edges, begin, facts.perimeter, halfway, everywhere)
+    ahead = sense * _way_ahead(edges, begin, facts.perimeter, place, edge)
     found, way = facing(
-        np.ascontiguousarray(points), outward[edge], owner, edge, edges.length[edge], place, edges.offsets, begin,
+        np.ascontiguousarray(points), ahead, owner, edge, edges.length[edge], place, edges.offsets, begin,
         np.ascontiguousarray(edges.start), np.ascontiguousarray(edges.end), outward, facts.low, facts.high,
-        np.maximum(WIDE * diameter, near), near, SEAM, AHEAD, FOLD, BEND,
+        np.maximum(WIDE * diameter, near), near, SEAM, AHEAD, FOLD, BEND, APART,
     )  # fmt: skip
     met = found >= 0
     target = np.where(met, edges.loop[np.maximum(found, 0)], -1)
@@ -124,3 +128,25 @@ def what_faces(edges: RimEdges, facts: LoopFacts, near: float, sense: float) -> 
         best = np.lexsort((votes, pair // loops))
         partner[pair[best] // loops] = pair[best] % loops
     return Facing(share, partner, width, widest)
+
+
+def _way_ahead(edges: RimEdges, begin: Array, perimeter: Array, place: Array, edge: IntArray) -> Array:
+    """(k, 3) unit way ahead at places (k,) given by arc length, on `edge`: the mean over a stretch of rim."""
+    loop = edges.loop[edge]
+    first, whole = begin[edges.offsets[loop]], perimeter[loop]
+    travelled = np.concatenate([np.zeros((1, 3)), np.cumsum(edges.length[:, None] * edges.outward, axis=0)])
+    round_trip = travelled[edges.offsets[loop + 1]] - travelled[edges.offsets[loop]]
+
+    def integral(at: Array) -> Array:
+        turns = np.floor((at - first) / np.maximum(whole, np.finfo(float).tiny))
+        inside = at - turns * whole
+        on = np.clip(np.searchsorted(begin, inside, side="right") - 1, edges.offsets[loop], edges.offsets[loop + 1] - 1)
+        step = np.clip(inside - begin[on], 0.0, edges.length[on])
+        return np.asarray(travelled[on] + step[:, None] * edges.outward[on] + turns[:, None] * round_trip)
+
+    mean = (integral(place + SMOOTH * whole) - integral(place - SMOOTH * whole)) / np.maximum(
+        2.0 * SMOOTH * whole, np.finfo(float).tiny
+    )[:, None]
+    size = np.linalg.norm(mean, axis=1, keepdims=True)
+    # round a sharp tip the mean has no direction
+    return np.where(size > 0.05, mean / np.maximum(size, np.finfo(float).tiny), edges.outward[edge])

@@ -3,8 +3,8 @@
 Width does not tell: a blade's open end is narrower than many a real gap. What tells is how the surface would go on.
 From each place of a rim the surface leaves straight ahead (in its own tangent plane, across the rim). Where that way
 meets another stretch of rim that leaves towards it, and the surface need not fold to get there, the surface goes on
-across the void: two rims that face each other so, or the two long sides of one, are a *gap*; one rim round a void that the
-surface around it continues across is a *hole*. Every other rim is an *opening*: the end of a tube, whose ways ahead
+across the void: two rims that face each other so, or the two long sides of one, are a *gap*; one rim round a void that
+the surface around it continues across is a *hole*. Every other rim is an *opening*: the end of a tube, whose ways ahead
 never meet; two skins of a thin body that both end; the border of a sheet; a large planar end section.
 """
 
@@ -24,7 +24,7 @@ from patchwright.repair.rim_edges import RimEdges, loop_facts, what_faces
 RimKind = Literal["gap", "hole", "opening"]
 
 MOSTLY = 0.5  # share of a rim's length that decides
-SLIT = 0.08  # width to perimeter: below it a rim is two long sides; a circle has 0.16 and more
+SLIT = 0.15  # width to diameter: below it a rim is two long sides; a circle has 0.35 and more
 SMALL = 0.1  # of the body's diagonal: a smaller void the surface goes on across is a hole even when it is planar
 TINY = 0.05  # of the body's diagonal: so small a rim is a hole unless it is clearly the end of a tube
 CONTINUES = 0.5  # cosine between cap and surface normals: the surface goes on across the void
@@ -83,10 +83,11 @@ def classify_rims(
     """
     adjacency = Adjacency.of(triangulation) if adjacency is None else adjacency
     tolerance = Tolerance.of(triangulation) if tolerance is None else tolerance
-    loops = [np.asarray(loop, dtype=np.int64) for loop in adjacency.boundary_loops()]
-    if not loops:
+    chains = adjacency.boundary_loops()
+    if not len(chains):
         return ()
-    edges, closed = _edges_of(triangulation, adjacency, loops)
+    loops, closed = list(chains.loops), chains.closed
+    edges = _edges_of(triangulation, adjacency, loops, closed)
     label = np.asarray(adjacency.components(), dtype=np.int64)
     component = label[edges.triangle[edges.offsets[:-1]]]
     return judge_loops(edges, loops, closed, component, _diagonals(triangulation, label)[component], tolerance.gap)
@@ -112,9 +113,10 @@ def judge_loops(
     rims = []
     for i, loop in enumerate(loops):
         partner, share, width = int(ahead.partner[i]), float(ahead.share[i]), float(ahead.width[i])
-        count = int(edges.offsets[i + 1] - edges.offsets[i])
+        own = edges.triangle[edges.offsets[i] : edges.offsets[i + 1]]
+        sides = -1 if not closed[i] else len(own) if (own != own[0]).any() else 0
         kind, reason = _judge(
-            count, i, partner, share, width, float(facts.perimeter[i]), float(facts.diameter[i]), float(body[i]),
+            sides, i, partner, share, width, float(facts.perimeter[i]), float(facts.diameter[i]), float(body[i]),
             float(facts.continues[i]), float(facts.planar[i]),
         )  # fmt: skip
         past = int(behind.partner[i])
@@ -142,7 +144,7 @@ def judge_loops(
                 diameter=float(facts.diameter[i]),
                 planar=float(facts.planar[i]),
                 reason=reason,
-                triangles=edges.triangle[edges.offsets[i] : edges.offsets[i + 1]],
+                triangles=own,
             )
         )
     return tuple(rims)
@@ -152,18 +154,20 @@ def _judge(
     edges: int, own: int, partner: int, share: float, width: float, perimeter: float, diameter: float, body: float,
     continues: float, planar: float,
 ) -> tuple[RimKind, str]:  # fmt: skip
-    """Kind and reason of one rim."""
+    """Kind and reason of one rim; `edges` is 0 round a single triangle, -1 for a chain that does not close."""
     faces = share >= MOSTLY and partner >= 0
     if faces and partner != own:
         return "gap", f"{share:.0%} of it faces rim {partner} across {width:.3g} and the surface goes on across"
-    if faces and width <= SLIT * perimeter:
+    if edges == 3:
+        return "hole", "one triangle is missing"
+    if faces and width <= SLIT * diameter:
         return (
             "gap",
             f"{share:.0%} of it faces its own other side across {width:.3g}: a slit {0.5 * perimeter:.3g} long",
         )
+    if edges < 0:
+        return "opening", "it ends at edges with more than two triangles: the border of a fin"
     small = diameter <= SMALL * body
-    if edges == 3 and continues > -0.5:
-        return "hole", "one triangle is missing"
     if diameter <= TINY * body and continues >= CONTINUES_TINY:
         return "hole", f"the surface around goes on across it, and its diameter is {diameter / body:.2g} of the body's"
     if continues >= CONTINUES or (faces and continues >= CONTINUES_TINY):
@@ -179,25 +183,24 @@ def _judge(
     return "opening", f"the surface does not go on across it: only {share:.0%} of it faces another stretch of rim"
 
 
-def _edges_of(triangulation: Triangulation, adjacency: Adjacency, loops: list[IntArray]) -> tuple[RimEdges, BoolArray]:
-    """The rims' edges with normals and ways ahead, and (l,) which loops are closed."""
+def _edges_of(triangulation: Triangulation, adjacency: Adjacency, loops: list[IntArray], closed: BoolArray) -> RimEdges:
+    """The rims' edges with normals and ways ahead."""
     points, triangles = triangulation.vertices, triangulation.triangles
     which, corner = np.nonzero(adjacency.free[adjacency.triangle_edges])
     tail, head = triangles[which, corner], triangles[which, (corner + 1) % 3]
     count = len(points)
     key = np.minimum(tail, head) * count + np.maximum(tail, head)
     order = np.argsort(key)
-    ordered = key[order]
     sizes = np.array([len(loop) for loop in loops])
     flat = np.concatenate(loops)
-    ahead = np.concatenate([np.roll(loop, -1) for loop in loops])
-    wanted = np.minimum(flat, ahead) * count + np.maximum(flat, ahead)
-    at = np.minimum(np.searchsorted(ordered, wanted), len(ordered) - 1)
-    real = ordered[at] == wanted
     last = np.cumsum(sizes) - 1
-    closed = real[last] & (sizes >= 3)
+    ahead = np.concatenate([flat[1:], flat[:1]])
+    ahead[last] = flat[last - sizes + 1]
+    real = np.ones(len(flat), dtype=np.bool_)
     real[last[~closed]] = False
-    pick = order[at[real]]
+    wanted = np.minimum(flat, ahead) * count + np.maximum(flat, ahead)
+    at = np.searchsorted(key[order], wanted[real])
+    pick = order[at]
     loop = np.repeat(np.arange(len(loops)), sizes)[real]
     offsets = np.concatenate([[0], np.cumsum(np.bincount(loop, minlength=len(loops)))]).astype(np.int64)
     owner = which[pick]
@@ -208,7 +211,7 @@ def _edges_of(triangulation: Triangulation, adjacency: Adjacency, loops: list[In
     length = np.linalg.norm(along, axis=1)
     outward = np.cross(along, normal)
     outward /= np.maximum(np.linalg.norm(outward, axis=1, keepdims=True), np.finfo(float).tiny)
-    return RimEdges(offsets, loop, p, q, length, normal, outward, owner), closed
+    return RimEdges(offsets, loop, p, q, length, normal, outward, owner)
 
 
 def _diagonals(triangulation: Triangulation, label: IntArray) -> Array:

@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
-
 from patchwright.models.arrays import Array, IntArray
 from patchwright.models.errors import ParameterError
 from patchwright.models.tolerance import Tolerance
@@ -148,7 +147,8 @@ def weld_distance(triangulation: Triangulation, tolerance: Tolerance) -> tuple[f
         return tolerance.gap, f"{why}; only {share:.1%} of the free edges meet up to {distance:.3g}"
     left = free - 2 * (floor + at + 1)
     return distance, (
-        f"the number of free edges falls from {free} to {left} at {distance:.3g} and stays up to {PLATEAU * distance:.3g}"
+        f"the number of free edges falls from {free} to {left} at {distance:.3g}"
+        f" and stays up to {PLATEAU * distance:.3g}"
     )
 
 

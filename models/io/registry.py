@@ -12,7 +12,8 @@ from patchwright.models.errors import UnsupportedFormat
 
 @dataclass(frozen=True, slots=True)
 class Format:
-    """One format: `module` has `read(path, unit) -> Assembly` when `reads` and `write(path, thing, **options)` when `writes`.
+    """One format: `module` has `read(path, unit) -> Assembly` when `reads` and `write(path, thing, **options)` when
+    `writes`.
 
     `holds` names what survives a round trip: "triangles", "names", "surfaces", "topology", "units", "grid".
     """
@@ -35,7 +36,14 @@ FORMATS: tuple[Format, ...] = (
     Format("PLY", (".ply", ".ply.gz"), "ply", True, True, frozenset({"triangles"})),
     Format("OFF", (".off", ".off.gz"), "off", True, False, frozenset({"triangles"})),
     Format("Cart3D", (".tri", ".tri.gz"), "cart3d", True, False, frozenset({"triangles", "names"})),
-    Format("Plot3D", (".xyz", ".p3d", ".x", ".fmt", ".p3dfmt"), "plot3d", True, True, frozenset({"grid"})),
+    Format(
+        "Plot3D",
+        (".xyz", ".p3d", ".x", ".fmt", ".p3dfmt", ".xyz.gz", ".p3d.gz", ".fmt.gz"),
+        "plot3d",
+        True,
+        True,
+        frozenset({"grid"}),
+    ),
     Format("VTK", (".vtk", ".vtp", ".vts", ".vtm"), "vtk", False, True, frozenset({"triangles", "names", "grid"})),
     Format("STEP", (".step", ".stp"), "step", True, True, frozenset({"surfaces", "topology", "names", "units"})),
     Format("IGES", (".igs", ".iges"), "iges", True, True, frozenset({"surfaces", "topology", "names", "units"})),

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from patchwright.models.arrays import BoolArray
 from patchwright.repair.checks.examination import Examination
 from patchwright.repair.checks.regions import plural, regional
 from patchwright.repair.checks.registry import Finding, check
-from patchwright.repair.diagnosis import Defect
+from patchwright.repair.diagnosis import Defect, Severity
 
 STRAY = 1e-3  # of the area: a smaller open piece is a leftover
 
@@ -26,11 +27,12 @@ def components(exam: Examination) -> Finding:
     area = np.bincount(label, weights=exam.body.areas)
     stray = (area < STRAY * area.sum()) & ~closed
     defects: list[Defect] = []
-    for which, severity, what in (
+    cases: tuple[tuple[BoolArray, Severity, str], ...] = (
         (stray, "warning", "a small open piece, connected to nothing"),
         (~stray & closed, "info", "a closed component"),
         (~stray & ~closed, "info", "an open component, connected to nothing else by an edge"),
-    ):
+    )
+    for which, severity, what in cases:
         index = np.flatnonzero(which[label])
 
         def say(count: int, size: float, what: str = what) -> str:
@@ -38,7 +40,7 @@ def components(exam: Examination) -> Finding:
 
         own = np.unique(label[index], return_inverse=True)[1].astype(np.int64)
         defects += regional(
-            exam, "component", severity, exam.body.triangles[index], exam.body.corners[index],  # type: ignore[arg-type]
+            exam, "component", severity, exam.body.triangles[index], exam.body.corners[index],
             exam.body_index[index], say, labels=own,
         )  # fmt: skip
     return Finding(tuple(defects), figures)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from patchwright.models.arrays import IntArray
+from patchwright.models.arrays import BoolArray, IntArray
 from patchwright.repair.checks.examination import Examination, box_of
 from patchwright.repair.checks.regions import plural, regional
 from patchwright.repair.checks.registry import Finding, check
-from patchwright.repair.diagnosis import Defect
+from patchwright.repair.diagnosis import Defect, Severity
 
 SHARES = (0.0, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3)  # of the diagonal: where the free-edge curve is read
 
@@ -51,6 +51,7 @@ def _unmerged(exam: Examination) -> tuple[Defect, ...]:
         return ()
     triangles, points = exam.merged.triangles, exam.merged.vertices
     which, corner = np.nonzero(exam.adjacency.free[exam.adjacency.triangle_edges])
+    which = exam.merged_index[which]
     tail, head = triangles[which, corner], triangles[which, (corner + 1) % 3]
     # the free edges whose ends moved together in the weld are those that closed
     after = exam.welded.triangles
@@ -71,22 +72,34 @@ def _unmerged(exam: Examination) -> tuple[Defect, ...]:
 
 
 def _non_manifold(exam: Examination) -> list[Defect]:
-    """Edges with three triangles or more once doubles are left out."""
-    many = exam.body_adjacency.non_manifold
-    if not many.any():
+    """Edges with three triangles or more once doubles are left out; a wall that parts share is meant, perhaps."""
+    adjacency = exam.body_adjacency
+    index = np.flatnonzero(adjacency.non_manifold)
+    if not len(index):
         return []
-    index = np.flatnonzero(many)
-    pairs = exam.body_adjacency.edges[index]
-    offsets, around = exam.body_adjacency.edge_triangles
-    owner = exam.body_index[np.asarray(around)[offsets[index]]]
-    use = int(exam.body_adjacency.use_count[index].max())
+    offsets, around = adjacency.edge_triangles
+    use = adjacency.use_count[index]
+    columns = np.arange(int(use.max()))
+    member = offsets[index][:, None] + np.minimum(columns, use[:, None] - 1)
+    owner = exam.body_index[around[member]]
+    tags = exam.raw.tags
+    shared = np.zeros(len(index), dtype=np.bool_) if tags is None else np.ptp(tags[owner], axis=1) > 0
+    pairs = adjacency.edges[index]
+    defects: list[Defect] = []
+    cases: tuple[tuple[BoolArray, Severity, str], ...] = (
+        (~shared, "error", ""),
+        (shared, "warning", " of several parts: a wall between them"),
+    )
+    for which, severity, what in cases:
 
-    def say(count: int, size: float) -> str:
-        return f"{plural(count, 'edge')} shared by more than two triangles (up to {use}), over {exam.length(size)}"
+        def say(count: int, size: float, what: str = what, most: int = int(use[which].max(initial=0))) -> str:
+            return f"{plural(count, 'edge')} shared by up to {most} triangles{what}, over {exam.length(size)}"
 
-    return regional(exam, "non-manifold-edge", "error", pairs, exam.body.vertices[pairs], owner, say)
+        points = exam.body.vertices[pairs[which]]
+        defects += regional(exam, "non-manifold-edge", severity, pairs[which], points, owner[which], say)
+    return defects
 
 
-def edgeedge_keys(start: IntArray, end: IntArray, count: int) -> IntArray:
+def edge_keys(start: IntArray, end: IntArray, count: int) -> IntArray:
     """One number per undirected edge."""
     return np.minimum(start, end) * count + np.maximum(start, end)

@@ -1,4 +1,4 @@
-"""`Examination`: a model under diagnosis, with everything more than one check needs, computed once when first asked for."""
+"""`Examination`: a model under diagnosis, with what several checks need, computed when first asked for."""
 
 from __future__ import annotations
 
@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from patchwright.repair.orient import Oriented
     from patchwright.repair.rims import Rim
 
+SMALL_OPENING = 0.05  # of the square root of a component's area: it bounds a body all the same
+
 
 @dataclass(frozen=True, eq=False)
 class Examination:
@@ -25,7 +27,7 @@ class Examination:
 
     The states, each with the triangles of the one before: `merged` (vertices with equal coordinates are one), `welded`
     (copies of a point within the distance the data shows are one), `body` (collapsed and doubled triangles left out;
-    `body_index` are the rest), `oriented` (as few triangles reversed as a consistent, outward orientation takes).
+    `body_index` are its triangles), `oriented` (as few triangles reversed as a consistent, outward orientation takes).
     """
 
     assembly: Assembly
@@ -44,9 +46,14 @@ class Examination:
         return weld(self.raw, 0.0).triangulation
 
     @cached_property
+    def merged_index(self) -> IntArray:
+        """(k,) the triangles of `merged` with three different vertices: those `adjacency` is of."""
+        return np.flatnonzero(~two_corners(self.merged.triangles))
+
+    @cached_property
     def adjacency(self) -> Adjacency:
-        """Of `merged`."""
-        return Adjacency.of(self.merged)
+        """Of `merged` without the triangles that use one vertex twice."""
+        return Adjacency.of(self.merged.take(self.merged_index))
 
     @cached_property
     def open_edges(self) -> int:
@@ -73,8 +80,7 @@ class Examination:
     @cached_property
     def collapsed(self) -> BoolArray:
         """(m,) triangles of `welded` that use one vertex twice."""
-        a, b, c = self.welded.triangles.T
-        return np.asarray((a == b) | (b == c) | (c == a))
+        return two_corners(self.welded.triangles)
 
     @cached_property
     def duplicate(self) -> BoolArray:
@@ -87,19 +93,28 @@ class Examination:
 
     @cached_property
     def body_index(self) -> IntArray:
-        """(b,) the triangles that are neither collapsed nor doubles of another."""
-        return np.flatnonzero(~self.collapsed & ~self.duplicate)
+        """(b,) the triangles of `body`."""
+        return self._cleaned[1]
 
     @cached_property
     def body(self) -> Triangulation:
-        """`welded` without collapsed and doubled triangles."""
-        return self.welded if len(self.body_index) == len(self.welded) else self.welded.take(self.body_index)
+        """`welded` without collapsed triangles, with one copy of doubled ones, none where they are a wall inside."""
+        return self._cleaned[0]
+
+    @cached_property
+    def _cleaned(self) -> tuple[Triangulation, IntArray]:
+        from patchwright.repair.clean import drop_collapsed, drop_duplicates
+
+        if not (self.collapsed.any() or self.duplicate.any()):
+            return self.welded, np.arange(len(self.welded))
+        whole = drop_collapsed(self.welded)
+        single = drop_duplicates(whole.triangulation)
+        return single.triangulation, whole.parents[single.parents]
 
     @cached_property
     def body_adjacency(self) -> Adjacency:
         """Of `body`."""
-        same = self.body is self.merged
-        return self.adjacency if same else Adjacency.of(self.body)
+        return self.adjacency if self.body is self.merged else Adjacency.of(self.body)
 
     @cached_property
     def component(self) -> IntArray:
@@ -110,7 +125,7 @@ class Examination:
     def component_closed(self) -> BoolArray:
         """(c,) components of `body` without a free edge."""
         open_triangle = self.body_adjacency.free[self.body_adjacency.triangle_edges].any(axis=1)
-        return np.bincount(self.component, weights=open_triangle) == 0
+        return np.asarray(np.bincount(self.component, weights=open_triangle) == 0)
 
     @cached_property
     def oriented(self) -> Oriented:
@@ -127,6 +142,24 @@ class Examination:
         turned = self.oriented.flipped.any()
         adjacency = Adjacency.of(self.oriented.triangulation) if turned else self.body_adjacency
         return classify_rims(self.oriented.triangulation, adjacency, self.tolerance)
+
+    @cached_property
+    def bodies(self) -> BoolArray:
+        """(c,) components of `body` that bound a body: closed, or open by gaps, holes and next to no openings."""
+        area = np.bincount(self.component, weights=self.body.areas)
+        wide = np.zeros(len(area))
+        for rim in self.rims:
+            if rim.kind == "opening":
+                own = self.component[rim.triangles[0]]
+                wide[own] = max(wide[own], rim.diameter)
+        return np.asarray(wide <= SMALL_OPENING * np.sqrt(area))
+
+    @cached_property
+    def crossing_pairs(self) -> IntArray:
+        """(k, 2) pairs of triangles of `body` that pass through each other."""
+        from patchwright.repair.crossings import crossing_pairs
+
+        return crossing_pairs(self.body, self.tolerance.gap)
 
     @cached_property
     def junctions(self) -> IntArray:
@@ -147,11 +180,23 @@ class Examination:
             return ()
         return tuple(self.raw.tag_names[k] for k in np.unique(tags[triangles]))
 
+    def triangles_of_face(self, faces: list[int]) -> IntArray:
+        """One triangle (index into `raw`) of each of some CAD faces that have any."""
+        sizes = np.array([len(part.triangulation) for part in self.assembly.parts], dtype=np.int64)
+        starts = np.cumsum(sizes) - sizes
+        return np.array([starts[face] for face in faces if sizes[face]], dtype=np.int64)
+
     def length(self, value: float) -> str:
         """A length in words: the number, the unit when it is known, and its share of the diagonal."""
         unit = "" if self.assembly.unit == "unknown" else f" {self.assembly.unit}"
         share = value / self.diagonal if self.diagonal > 0.0 else 0.0
         return f"{value:.3g}{unit} ({share:.2g} of the diagonal)"
+
+
+def two_corners(triangles: IntArray) -> BoolArray:
+    """(m,) triangles that use one vertex twice."""
+    a, b, c = triangles.T
+    return np.asarray((a == b) | (b == c) | (c == a))
 
 
 def box_of(points: Array) -> Array:

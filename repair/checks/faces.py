@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from patchwright.models.arrays import Array, BoolArray, IntArray
-from patchwright.repair.checks.examination import Examination
+from patchwright.repair.checks.examination import Examination, two_corners
 from patchwright.repair.checks.regions import plural, regional
 from patchwright.repair.checks.registry import Finding, check
 from patchwright.repair.diagnosis import Defect, Severity
@@ -26,8 +26,7 @@ def faces(exam: Examination) -> Finding:
     height = np.divide(2.0 * area, longest, out=np.zeros_like(area), where=longest > 0.0)
     low, high = exam.raw.bounds
     rounding = 4.0 * float(np.finfo(np.float64).eps) * float(max(np.abs(low).max(), np.abs(high).max()))
-    a, b, c = exam.merged.triangles.T
-    collapsed = (a == b) | (b == c) | (c == a)
+    collapsed = two_corners(exam.merged.triangles)
     flat = (height <= rounding) & ~collapsed
     welded_away = exam.collapsed & ~collapsed & ~flat
     needle = (longest > NEEDLE * height) & ~collapsed & ~flat & ~welded_away

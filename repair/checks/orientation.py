@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from patchwright.models.arrays import BoolArray
+from patchwright.models.arrays import Array, BoolArray, IntArray
+from patchwright.models.triangulation import Triangulation
 from patchwright.repair.checks.examination import Examination, box_of
 from patchwright.repair.checks.regions import plural, regional
 from patchwright.repair.checks.registry import Finding, check
-from patchwright.repair.diagnosis import Defect
+from patchwright.repair.diagnosis import Defect, Severity
 
 
 @check("orientation", looks="mesh", kinds=("flipped",))
@@ -60,10 +61,10 @@ def _volume(exam: Examination, cavity: BoolArray) -> float | None:
 def _closed(exam: Examination, parts: int) -> BoolArray:
     """(c,) components, labelled as in `oriented`, without a free edge."""
     rim = exam.body_adjacency.free[exam.body_adjacency.triangle_edges].any(axis=1)
-    return np.bincount(exam.oriented.components, weights=rim, minlength=parts) == 0
+    return np.asarray(np.bincount(exam.oriented.components, weights=rim, minlength=parts) == 0)
 
 
-def _zones(exam: Examination) -> np.ndarray:  # type: ignore[type-arg]
+def _zones(exam: Examination) -> IntArray:
     """(b,) label of each triangle's zone: triangles connected through edges that both run consistently."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
@@ -84,19 +85,32 @@ def _cavities(exam: Examination, whole: BoolArray) -> BoolArray:
     cavity = np.zeros(parts, dtype=np.bool_)
     if not len(inner) or parts == 1:
         return cavity
-    from patchwright.models.winding import winding_number
-
     body, component = exam.oriented.triangulation, exam.oriented.components
     outside = body.take(~whole[component] & _closed(exam, parts)[component])
     if not len(outside):
         return cavity
     _, first = np.unique(component, return_index=True)
     centre = body.corners[first[inner]].mean(axis=1)
-    cavity[inner] = winding_number(outside, centre) > 0.5
+    cavity[inner] = [_winding(outside, point) > 0.5 for point in centre]
     return cavity
 
 
-def _bodies(exam: Examination, which: BoolArray, severity: str, what: str) -> list[Defect]:
+def _winding(body: Triangulation, point: Array) -> float:
+    """Winding number of a closed body around a point: the sum of the solid angles (Van Oosterom and Strackee 1983)."""
+    local = body.corners - point
+    length = np.linalg.norm(local, axis=2)
+    a, b, c = np.moveaxis(local, 1, 0)
+    six = np.einsum("ij,ij->i", a, np.cross(b, c))
+    under = (
+        length.prod(axis=1)
+        + np.einsum("ij,ij->i", a, b) * length[:, 2]
+        + np.einsum("ij,ij->i", b, c) * length[:, 0]
+        + np.einsum("ij,ij->i", c, a) * length[:, 1]
+    )
+    return float(np.arctan2(six, under).sum() / (2.0 * np.pi))
+
+
+def _bodies(exam: Examination, which: BoolArray, severity: Severity, what: str) -> list[Defect]:
     """One defect per component."""
     component = exam.oriented.components
     defects = []
@@ -106,5 +120,5 @@ def _bodies(exam: Examination, which: BoolArray, severity: str, what: str) -> li
         parts = exam.parts_of(exam.body_index[own])
         message = f"a component of {plural(len(own), 'triangle')} {what}"
         size = float(np.linalg.norm(box[1] - box[0]))
-        defects.append(Defect("flipped", severity, box.mean(axis=0), size, parts, len(own), message, box))  # type: ignore[arg-type]
+        defects.append(Defect("flipped", severity, box.mean(axis=0), size, parts, len(own), message, box))
     return defects

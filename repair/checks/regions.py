@@ -10,7 +10,7 @@ from patchwright.models.arrays import Array, IntArray
 from patchwright.repair.checks.examination import Examination
 from patchwright.repair.diagnosis import Defect, Severity
 
-MOST = 200  # regions of one kind that are listed one by one; the smaller ones are summed up in one more
+MOST = 2000  # regions of one kind that are listed one by one; the smaller ones are summed up in one more
 
 
 def region_labels(elements: IntArray, links: IntArray | None = None) -> IntArray:
@@ -85,7 +85,7 @@ def regional(
                 int(counts[r]),
                 say(int(counts[r]), float(size[r])),
                 np.stack([low[r], high[r]]),
-            )  # fmt: skip
+            )
         )
     rest = rank[MOST:]
     if len(rest):
@@ -101,7 +101,7 @@ def regional(
                 total,
                 f"{say(total, float(size[rest].max()))}, in {len(rest)} further small places",
                 np.stack([low[rest].min(axis=0), high[rest].max(axis=0)]),
-            )  # fmt: skip
+            )
         )
     return defects
 

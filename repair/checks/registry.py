@@ -46,6 +46,7 @@ _MODULES = (
     "domain",
     "cad",
     "cad_rims",
+    "parametrisation",
 )
 
 

@@ -8,15 +8,18 @@ from patchwright.models.arrays import Array, IntArray
 from patchwright.repair.checks.examination import Examination, box_of
 from patchwright.repair.checks.regions import MOST, plural
 from patchwright.repair.checks.registry import Finding, check
-from patchwright.repair.diagnosis import Defect
+from patchwright.repair.diagnosis import Defect, Severity
 from patchwright.repair.rims import Rim
+
+SLIVER = 8  # edges: a hole of more is no sliver at a t-junction
 
 
 @check("rims", looks="mesh", kinds=("gap", "opening", "overlap"))
 def rims(exam: Examination) -> Finding:
     """What is still open after welding: gaps and holes to be bridged, openings to be kept.
 
-    A seam whose sides coincide but are meshed differently is a t-junction, reported there and not here.
+    A seam whose sides coincide but are meshed differently is a t-junction, and the border of a fin ends at non-manifold
+    edges: both are reported there and not here. A single loose triangle is a component, not an opening.
     """
     found = exam.rims
     figures = {
@@ -29,9 +32,14 @@ def rims(exam: Examination) -> Finding:
         return Finding(figures=figures)
     points = exam.body.vertices
     seam = _coincident(exam, found)
-    groups = [group for group in rim_groups(found) if not all(seam[i] for i in group)]
+    alone = np.bincount(exam.component)[exam.component] == 1
+    told = [
+        seam[i] or (rim.kind == "opening" and (not rim.closed or (len(found) > 1 and bool(alone[rim.triangles].all()))))
+        for i, rim in enumerate(found)
+    ]
+    groups = [group for group in rim_groups(found) if not all(told[i] for i in group)]
     defects = [_defect(exam, found, group, points) for group in groups]
-    return Finding(tuple(_most(exam, defects)), figures)
+    return Finding(tuple(most_of_each(exam, defects)), figures)
 
 
 def rim_groups(rims: tuple[Rim, ...]) -> list[list[int]]:
@@ -49,7 +57,7 @@ def rim_groups(rims: tuple[Rim, ...]) -> list[list[int]]:
     return [group.tolist() for group in np.split(order, ends[:-1])]
 
 
-def describe(exam: Examination, some: list[Rim]) -> tuple[str, str, float, str]:
+def describe(exam: Examination, some: list[Rim]) -> tuple[str, Severity, float, str]:
     """Kind, severity, size and message of a group of rims."""
     first = max(some, key=lambda rim: rim.perimeter)
     if first.kind == "opening":
@@ -62,9 +70,8 @@ def describe(exam: Examination, some: list[Rim]) -> tuple[str, str, float, str]:
         )
         return "opening", "warning", first.diameter, message
     if first.kind == "hole":
-        message = (
-            f"a hole with {plural(len(first.loop), 'edge')}, perimeter {exam.length(first.perimeter)}: {first.reason}"
-        )
+        edges = plural(len(first.triangles), "edge")
+        message = f"a hole with {edges}, perimeter {exam.length(first.perimeter)}: {first.reason}"
         return "gap", "error", first.diameter, message
     between = f"between {len(some)} rims" if len(some) > 1 else "between the two sides of one rim"
     along = 0.5 * sum(rim.perimeter for rim in some)
@@ -83,19 +90,30 @@ def _defect(exam: Examination, found: tuple[Rim, ...], group: list[int], points:
     centre = np.average([rim.centre for rim in some], axis=0, weights=weights if weights.sum() > 0 else None)
     triangles = exam.body_index[np.concatenate([rim.triangles for rim in some])]
     edges = sum(len(rim.triangles) for rim in some)
-    return Defect(kind, severity, centre, size, exam.parts_of(triangles), edges, message, box_of(points[loops]))  # type: ignore[arg-type]
+    return Defect(kind, severity, centre, size, exam.parts_of(triangles), edges, message, box_of(points[loops]))
 
 
 def _coincident(exam: Examination, found: tuple[Rim, ...]) -> list[bool]:
-    """Which rims are gaps of no width with t-junctions on them."""
-    hits = exam.junctions
-    closed = [rim.kind == "gap" and rim.widest <= exam.tolerance.gap for rim in found]
-    if not len(hits) or not any(closed):
+    """Which rims are seams of no width with t-junctions on them: slivers between a coarse and a fine side."""
+    if not len(exam.junctions):
         return [False] * len(found)
-    return closed
+    on = np.zeros(len(exam.body.vertices), dtype=np.bool_)
+    on[exam.junctions[:, 0]] = True
+    return [bool(on[rim.loop].any()) and _sliver_width(exam, rim) <= exam.tolerance.gap for rim in found]
 
 
-def _most(exam: Examination, defects: list[Defect]) -> list[Defect]:
+def _sliver_width(exam: Examination, rim: Rim) -> float:
+    """The gap's width, or the mean width of a small hole: its area over half its perimeter."""
+    if rim.kind == "gap":
+        return rim.widest
+    if rim.kind == "opening" or len(rim.loop) > SLIVER:
+        return float("inf")
+    local = exam.body.vertices[rim.loop] - rim.centre
+    area = 0.5 * float(np.linalg.norm(np.cross(local, np.roll(local, -1, axis=0)).sum(axis=0)))
+    return 2.0 * area / rim.perimeter if rim.perimeter > 0.0 else 0.0
+
+
+def most_of_each(exam: Examination, defects: list[Defect]) -> list[Defect]:
     """The largest `MOST` of each kind; the rest summed up in one more."""
     kept: list[Defect] = []
     for kind in dict.fromkeys(defect.kind for defect in defects):

@@ -1,0 +1,222 @@
+"""Kernels of `tree`: watertight rays and segments against the tree (layout: `_tree_kernel`)."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from patchwright.models._tree_kernel import STACK, Boxes, Index
+from patchwright.models.arrays import Array, IntArray
+
+HUGE = 1e300  # stands for 1 / 0: its product with zero is zero
+SLACK = 4e-15  # on the parameters of box planes: more than their rounding
+
+
+@njit(cache=True, nogil=True)
+def two_product_tail(a: float, b: float, p: float) -> float:
+    """a b - p exactly, for p = fl(a b) (Dekker 1971)."""
+    c = 134217729.0 * a
+    ah = c - (c - a)
+    al = a - ah
+    c = 134217729.0 * b
+    bh = c - (c - b)
+    bl = b - bh
+    return al * bl - (((p - ah * bh) - al * bh) - ah * bl)
+
+
+@njit(cache=True, nogil=True)
+def exact_sign(a: float, b: float, c: float, d: float) -> float:
+    """A number of the sign of a b - c d, barring underflow."""
+    p, q = a * b, c * d
+    e, f = two_product_tail(a, b, p), two_product_tail(c, d, q)
+    s = e - f
+    z = s - e
+    tail = (e - (s - z)) + (-f - z)
+    difference = p - q
+    if abs(difference) > 4.5e-16 * (abs(p) + abs(q)):
+        return difference
+    total = difference + s  # the difference of two so near each other is exact (Sterbenz)
+    return total if total != 0.0 else tail
+
+
+@njit(cache=True, nogil=True)
+def ray_frame(direction: Array) -> tuple[int, int, int, float, float, float]:
+    """Axes permuted so that the longest comes last, and the shear that turns the direction into it (Woop 2013)."""
+    kz = 0
+    for k in range(1, 3):
+        if abs(direction[k]) > abs(direction[kz]):
+            kz = k
+    kx, ky = (kz + 1) % 3, (kz + 2) % 3
+    return kx, ky, kz, direction[kx] / direction[kz], direction[ky] / direction[kz], 1.0 / direction[kz]
+
+
+@njit(cache=True, nogil=True)
+def ray_triangle(
+    corners: Array, i: int, ox: float, oy: float, oz: float, kx: int, ky: int, kz: int, sx: float, sy: float, sz: float
+) -> tuple[float, float, float, float]:
+    """Parameter and barycentric coordinates of the crossing with row i of `corners`; parameter -1 if there is none.
+
+    Watertight: the sheared corners are the same numbers in every triangle that has the corner, and the signs of the
+    edge functions of those numbers are exact, so that a line through a closed surface crosses it. The origin's
+    coordinates `ox, oy, oz` come in the frame's order of axes.
+    """
+    az, bz, cz = corners[i, kz] - oz, corners[i, 3 + kz] - oz, corners[i, 6 + kz] - oz
+    ax, ay = (corners[i, kx] - ox) - sx * az, (corners[i, ky] - oy) - sy * az
+    bx, by = (corners[i, 3 + kx] - ox) - sx * bz, (corners[i, 3 + ky] - oy) - sy * bz
+    cx, cy = (corners[i, 6 + kx] - ox) - sx * cz, (corners[i, 6 + ky] - oy) - sy * cz
+    u, v, w = cx * by - cy * bx, ax * cy - ay * cx, bx * ay - by * ax
+    reach = max(max(max(abs(ax), abs(ay)), max(abs(bx), abs(by))), max(abs(cx), abs(cy)))
+    error = 9e-16 * reach * reach  # more than the rounding of u, v and w
+    if min(min(u, v), w) < -error and max(max(u, v), w) > error:
+        return -1.0, 0.0, 0.0, 0.0
+    if min(min(abs(u), abs(v)), abs(w)) <= error:
+        u = u if abs(u) > error else exact_sign(cx, by, cy, bx)
+        v = v if abs(v) > error else exact_sign(ax, cy, ay, cx)
+        w = w if abs(w) > error else exact_sign(bx, ay, by, ax)
+        if min(min(u, v), w) < 0.0 and max(max(u, v), w) > 0.0:
+            return -1.0, 0.0, 0.0, 0.0
+    total = u + v + w
+    if total == 0.0:
+        return -1.0, 0.0, 0.0, 0.0
+    u, v, w = u / total, v / total, w / total
+    return (u * az + v * bz + w * cz) * sz, u, v, w
+
+
+@njit(cache=True, nogil=True)
+def inverse(x: float) -> float:
+    """1 / x, finite."""
+    return 1.0 / x if abs(x) > 1.0 / HUGE else HUGE
+
+
+@njit(cache=True, nogil=True)
+def entry(
+    boxes: Boxes, node: int, at: int, px: float, py: float, pz: float, ix: float, iy: float, iz: float, best: float
+) -> float:
+    """Parameter at which a ray enters a box, from below; inf if it misses it or comes later than `best`."""
+    x0, x1 = (boxes[node, at] - px) * ix, (boxes[node, at + 3] - px) * ix
+    y0, y1 = (boxes[node, at + 1] - py) * iy, (boxes[node, at + 4] - py) * iy
+    z0, z1 = (boxes[node, at + 2] - pz) * iz, (boxes[node, at + 5] - pz) * iz
+    near = max(max(min(x0, x1), min(y0, y1)), max(min(z0, z1), 0.0)) * (1.0 - SLACK)
+    far = min(min(max(x0, x1), max(y0, y1)), min(max(z0, z1), best))
+    return near if near <= far else np.inf
+
+
+@njit(cache=True, nogil=True)
+def first_hits(
+    boxes: Boxes,
+    child: Index,
+    corners: Array,
+    index: Index,
+    center: Array,
+    origins: Array,
+    directions: Array,
+    reach: Array,
+    order: IntArray,
+    distance: Array,
+    triangle: IntArray,
+    barycentric: Array,
+) -> None:
+    """Nearest hit of the rays `order`; `reach` and `distance` are lengths, whatever the length of the directions."""
+    direction = np.empty(3)
+    stack = np.empty(STACK, np.int32)
+    enter = np.empty(STACK)
+    for r in order:
+        dx, dy, dz = directions[r, 0], directions[r, 1], directions[r, 2]
+        longest = max(max(abs(dx), abs(dy)), abs(dz))
+        direction[0], direction[1], direction[2] = dx / longest, dy / longest, dz / longest
+        length = np.sqrt(direction[0] ** 2 + direction[1] ** 2 + direction[2] ** 2)
+        kx, ky, kz, sx, sy, sz = ray_frame(direction)
+        ox, oy, oz = origins[r, kx], origins[r, ky], origins[r, kz]
+        px, py, pz = origins[r, 0] - center[0], origins[r, 1] - center[1], origins[r, 2] - center[2]
+        ix, iy, iz = inverse(direction[0]), inverse(direction[1]), inverse(direction[2])
+        best = reach[r % reach.shape[0]] / length
+        found = -1
+        wa, wb, wc = 0.0, 0.0, 0.0
+        stack[0] = 0
+        enter[0] = 0.0
+        top = 1
+        while top:
+            top -= 1
+            if enter[top] > best:
+                continue
+            node = stack[top]
+            while node >= 0:
+                left = entry(boxes, node, 0, px, py, pz, ix, iy, iz, best)
+                right = entry(boxes, node, 6, px, py, pz, ix, iy, iz, best)
+                if min(left, right) == np.inf:
+                    break
+                if left <= right:
+                    stack[top] = child[node, 1]
+                    enter[top] = right
+                    node = child[node, 0]
+                else:
+                    stack[top] = child[node, 0]
+                    enter[top] = left
+                    node = child[node, 1]
+                top += max(left, right) < np.inf
+            if node < 0:
+                code = -(np.int64(node) + 1)
+                for i in range(code >> 3, (code >> 3) + (code & 7)):
+                    t, u, v, w = ray_triangle(corners, i, ox, oy, oz, kx, ky, kz, sx, sy, sz)
+                    if t >= 0.0 and (t < best or (t == best and (found < 0 or index[i] < found))):
+                        best, found, wa, wb, wc = t, np.int64(index[i]), u, v, w
+        triangle[r] = found
+        distance[r] = best * length if found >= 0 else np.inf
+        barycentric[r, 0], barycentric[r, 1], barycentric[r, 2] = wa, wb, wc
+
+
+@njit(cache=True, nogil=True)
+def all_hits(
+    boxes: Boxes, child: Index, corners: Array, index: Index, center: Array, start: Array, end: Array
+) -> tuple[IntArray, Array]:
+    """Every crossing of each segment, by (t, triangle): counts (n,) and rows t, triangle, three barycentric."""
+    n = start.shape[0]
+    count = np.zeros(n, np.int64)
+    hits = np.empty((max(16, 2 * n), 5))
+    stack = np.empty(STACK, np.int32)
+    direction = np.empty(3)
+    filled = 0
+    for r in range(n):
+        length = 0.0
+        for k in range(3):
+            direction[k] = end[r, k] - start[r, k]
+            length = max(length, abs(direction[k]))
+        if length == 0.0:
+            continue
+        kx, ky, kz, sx, sy, sz = ray_frame(direction)
+        ox, oy, oz = start[r, kx], start[r, ky], start[r, kz]
+        px, py, pz = start[r, 0] - center[0], start[r, 1] - center[1], start[r, 2] - center[2]
+        ix, iy, iz = inverse(direction[0]), inverse(direction[1]), inverse(direction[2])
+        stack[0] = 0
+        top = 1
+        while top:
+            top -= 1
+            node = stack[top]
+            if node >= 0:
+                for half in range(2):
+                    if entry(boxes, node, 6 * half, px, py, pz, ix, iy, iz, 1.0) < np.inf:
+                        stack[top] = child[node, half]
+                        top += 1
+                continue
+            code = -(np.int64(node) + 1)
+            for i in range(code >> 3, (code >> 3) + (code & 7)):
+                t, u, v, w = ray_triangle(corners, i, ox, oy, oz, kx, ky, kz, sx, sy, sz)
+                if not 0.0 <= t <= 1.0:
+                    continue
+                if filled == hits.shape[0]:
+                    more = np.empty((2 * filled, 5))
+                    for j in range(filled):
+                        for k in range(5):
+                            more[j, k] = hits[j, k]
+                    hits = more
+                j = filled
+                while j > filled - count[r] and (
+                    t < hits[j - 1, 0] or (t == hits[j - 1, 0] and index[i] < hits[j - 1, 1])
+                ):
+                    for k in range(5):
+                        hits[j, k] = hits[j - 1, k]
+                    j -= 1
+                hits[j, 0], hits[j, 1], hits[j, 2], hits[j, 3], hits[j, 4] = t, index[i], u, v, w
+                filled += 1
+                count[r] += 1
+    return count, hits[:filled]

@@ -1,0 +1,320 @@
+"""Kernels of `tree`: binned surface-area build, order of queries, overlapping boxes.
+
+Layout: inner node i holds the boxes of its two children in `boxes[i]` (lower x, y, z, upper x, y, z of the left, then
+of the right child; float32 about `center`, padded by more than any rounding here or in the queries) and the children in
+`child[i]`: an inner node c >= 0, or -(8 first + count) - 1 for a leaf of `count` triangles from row `first` of
+`corners` (k, 9), which are float64 in the model's own frame; `index` gives their number in the triangulation.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+
+from patchwright.models.arrays import Array, IntArray
+
+Boxes = npt.NDArray[np.float32]
+Index = npt.NDArray[np.int32]
+
+LEAF = 4
+BINS = 16
+DEEPEST = 48  # below this depth ranges are halved, so that no tree is deeper than 48 + 28
+STACK = 160
+
+
+@njit(cache=True, nogil=True)
+def primitive_boxes(vertices: Array, triangles: IntArray, center: Array, pad: float) -> Boxes:
+    """(m, 6) boxes of the triangles about `center`, padded."""
+    m = triangles.shape[0]
+    boxes = np.empty((m, 6), np.float32)
+    for t in range(m):
+        a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+        for k in range(3):
+            x, y, z = vertices[a, k], vertices[b, k], vertices[c, k]
+            boxes[t, k] = np.float32(min(min(x, y), z) - center[k] - pad)
+            boxes[t, k + 3] = np.float32(max(max(x, y), z) - center[k] + pad)
+    return boxes
+
+
+@njit(cache=True, nogil=True)
+def clear(box: Boxes) -> None:
+    """Make `box` (6,) the empty box."""
+    for k in range(3):
+        box[k] = np.inf
+        box[k + 3] = -np.inf
+
+
+@njit(cache=True, nogil=True)
+def widen(box: Boxes, by: Boxes) -> None:
+    """Make `box` (6,) hold the box `by`."""
+    for k in range(3):
+        box[k] = min(box[k], by[k])
+        box[k + 3] = max(box[k + 3], by[k + 3])
+
+
+@njit(cache=True, nogil=True)
+def half_area(box: Boxes) -> float:
+    """Half the surface of a box."""
+    dx, dy, dz = box[3] - box[0], box[4] - box[1], box[5] - box[2]
+    return dx * dy + dy * dz + dz * dx
+
+
+@njit(cache=True, nogil=True)
+def partition(
+    boxes: Boxes, order: Index, begin: int, end: int, bins: Boxes, count: IntArray, area: Array, halves: Boxes
+) -> int:
+    """Permute the boxes begin..end at the best of 15 planes; where the right half begins, `begin` if none parts them.
+
+    `halves` (2, 6) become the boxes of the two halves.
+    """
+    low = np.empty(3, np.float32)
+    high = np.empty(3, np.float32)
+    for k in range(3):
+        low[k] = np.inf
+        high[k] = -np.inf
+    for i in range(begin, end):
+        for k in range(3):
+            c = boxes[i, k] + boxes[i, k + 3]
+            low[k] = min(low[k], c)
+            high[k] = max(high[k], c)
+    axis = 0
+    for k in range(1, 3):
+        if high[k] - low[k] > high[axis] - low[axis]:
+            axis = k
+    if not high[axis] > low[axis]:
+        return begin
+    scale = np.float32(0.99999 * BINS) / (high[axis] - low[axis])
+    origin = low[axis]
+    for b in range(BINS):
+        count[b] = 0
+        clear(bins[b])
+    for i in range(begin, end):
+        b = min(int((boxes[i, axis] + boxes[i, axis + 3] - origin) * scale), BINS - 1)
+        count[b] += 1
+        widen(bins[b], boxes[i])
+    clear(halves[1])
+    for b in range(BINS - 1, 0, -1):
+        widen(halves[1], bins[b])
+        area[b] = half_area(halves[1])
+    clear(halves[0])
+    left, cut, best = 0, 0, np.inf
+    for b in range(BINS - 1):
+        widen(halves[0], bins[b])
+        left += count[b]
+        if 0 < left < end - begin:
+            cost = half_area(halves[0]) * left + area[b + 1] * (end - begin - left)
+            if cost < best:
+                best = cost
+                cut = b + 1
+    for half in range(2):
+        clear(halves[half])
+    for b in range(BINS):
+        widen(halves[0 if b < cut else 1], bins[b])
+    split, last = begin, end - 1
+    while split <= last:
+        if min(int((boxes[split, axis] + boxes[split, axis + 3] - origin) * scale), BINS - 1) < cut:
+            split += 1
+            continue
+        i = order[split]
+        order[split] = order[last]
+        order[last] = i
+        for k in range(6):
+            c = boxes[split, k]
+            boxes[split, k] = boxes[last, k]
+            boxes[last, k] = c
+        last -= 1
+    return split
+
+
+@njit(cache=True, nogil=True)
+def build(boxes: Boxes) -> tuple[Boxes, Index, Index]:
+    """Top-down build by the surface-area heuristic on 16 bins of the longest axis of the box centres.
+
+    Returns the nodes' boxes (n, 12), children (n, 2) and the order of the triangles in the leaves. `boxes` is permuted.
+    """
+    m = boxes.shape[0]
+    order = np.empty(m, np.int32)
+    for i in range(m):
+        order[i] = i
+    node_boxes = np.empty((max(m, 1), 12), np.float32)
+    child = np.empty((max(m, 1), 2), np.int32)
+    stack = np.empty((STACK, 4), np.int64)  # begin, end, 2 parent + side, depth
+    count = np.empty(BINS, np.int64)
+    area = np.empty(BINS, np.float64)
+    bins = np.empty((BINS, 6), np.float32)
+    halves = np.empty((2, 6), np.float32)
+    nodes = 0
+    stack[0, 0], stack[0, 1], stack[0, 2], stack[0, 3] = 0, m, -1, 0
+    top = 1
+    while top:
+        top -= 1
+        begin, end, link, depth = stack[top, 0], stack[top, 1], stack[top, 2], stack[top, 3]
+        if link >= 0:
+            if end - begin <= LEAF:
+                child[link >> 1, link & 1] = -(8 * begin + (end - begin)) - 1
+                continue
+            child[link >> 1, link & 1] = nodes
+        split = begin
+        if end - begin > LEAF and depth < DEEPEST:
+            split = partition(boxes, order, begin, end, bins, count, area, halves)
+        if split == begin:
+            split = end if end - begin <= LEAF else (begin + end) // 2  # a tree of one leaf has an empty right child
+            for half in range(2):
+                clear(halves[half])
+            for i in range(begin, end):
+                widen(halves[0 if i < split else 1], boxes[i])
+        for half in range(2):
+            for k in range(6):
+                node_boxes[nodes, 6 * half + k] = halves[half, k]
+            stack[top, 0] = begin if half else split
+            stack[top, 1] = split if half else end
+            stack[top, 2] = 2 * nodes + 1 - half
+            stack[top, 3] = depth + 1
+            top += 1
+        nodes += 1
+    return node_boxes[:nodes].copy(), child[:nodes].copy(), order
+
+
+@njit(cache=True, nogil=True)
+def gather(vertices: Array, triangles: IntArray, order: Index) -> Array:
+    """(m, 9) corners of the triangles in the order of the leaves."""
+    m = order.shape[0]
+    corners = np.empty((m, 9))
+    for i in range(m):
+        for j in range(3):
+            v = triangles[order[i], j]
+            for k in range(3):
+                corners[i, 3 * j + k] = vertices[v, k]
+    return corners
+
+
+@njit(cache=True, nogil=True)
+def morton_order(points: Array) -> IntArray:
+    """(n,) an order in which successive points are near: 30-bit Morton codes, sorted by three radix passes."""
+    n = points.shape[0]
+    low = np.full(3, np.inf)
+    extent = 0.0
+    for k in range(3):
+        high = -np.inf
+        for i in range(n):
+            low[k] = min(low[k], points[i, k])
+            high = max(high, points[i, k])
+        extent = max(extent, high - low[k])
+    scale = 1023.0 / extent if 0.0 < extent < np.inf else 0.0
+    code = np.zeros(n, np.int64)
+    for i in range(n):
+        for k in range(3):
+            x = np.int64((points[i, k] - low[k]) * scale)
+            x = (x | (x << 16)) & 0x030000FF
+            x = (x | (x << 8)) & 0x0300F00F
+            x = (x | (x << 4)) & 0x030C30C3
+            code[i] |= ((x | (x << 2)) & 0x09249249) << k
+    order = np.arange(n)
+    other = np.empty(n, np.int64)
+    start = np.empty(1025, np.int64)
+    for digit in range(3):
+        start[:] = 0
+        for i in range(n):
+            start[((code[i] >> (10 * digit)) & 1023) + 1] += 1
+        for b in range(1024):
+            start[b + 1] += start[b]
+        for i in range(n):
+            b = (code[order[i]] >> (10 * digit)) & 1023
+            other[start[b]] = order[i]
+            start[b] += 1
+        order, other = other, order
+    return order
+
+
+@njit(cache=True, nogil=True)
+def exact_boxes(corners: Array) -> Array:
+    """(m, 6) boxes of the triangles in the order of the leaves, not padded."""
+    boxes = np.empty((corners.shape[0], 6))
+    for i in range(corners.shape[0]):
+        for k in range(3):
+            boxes[i, k] = min(corners[i, k], corners[i, 3 + k], corners[i, 6 + k])
+            boxes[i, k + 3] = max(corners[i, k], corners[i, 3 + k], corners[i, 6 + k])
+    return boxes
+
+
+@njit(cache=True, nogil=True)
+def children_boxes(boxes: Boxes, exact: Array, center: Array, code: int, out: Array) -> int:
+    """How many boxes stand for `code` (two for an inner node, one for a leaf), and the boxes, in the model frame."""
+    if code >= 0:
+        for half in range(2):
+            for k in range(6):
+                out[half, k] = boxes[code, 6 * half + k] + center[k % 3]
+        return 2
+    code = -(code + 1)
+    for k in range(3):
+        out[0, k], out[0, k + 3] = np.inf, -np.inf
+    for i in range(code >> 3, (code >> 3) + (code & 7)):
+        for k in range(3):
+            out[0, k] = min(out[0, k], exact[i, k])
+            out[0, k + 3] = max(out[0, k + 3], exact[i, k + 3])
+    return 1
+
+
+@njit(cache=True, nogil=True)
+def touch(a: Array, i: int, b: Array, j: int) -> bool:
+    """Whether box i of `a` and box j of `b` have a point in common."""
+    apart = False
+    for k in range(3):
+        apart |= (a[i, k] > b[j, k + 3]) | (b[j, k] > a[i, k + 3])
+    return not apart
+
+
+@njit(cache=True, nogil=True)
+def overlapping(
+    a_boxes: Boxes,
+    a_child: Index,
+    a_exact: Array,
+    a_index: Index,
+    a_center: Array,
+    b_boxes: Boxes,
+    b_child: Index,
+    b_exact: Array,
+    b_index: Index,
+    b_center: Array,
+    own: bool,
+) -> IntArray:
+    """Pairs of triangles whose exact boxes touch; with `own` the trees are one and each pair comes once, i < j."""
+    capacity = max(64, 8 * a_index.shape[0])
+    pairs = np.empty((capacity, 2), np.int64)
+    filled = 0
+    stack = np.empty((4 * STACK, 2), np.int64)
+    a_box = np.empty((2, 6))
+    b_box = np.empty((2, 6))
+    stack[0, 0], stack[0, 1] = 0, 0
+    top = 1
+    while top:
+        top -= 1
+        a, b = stack[top, 0], stack[top, 1]
+        if a >= 0 or b >= 0:
+            na = children_boxes(a_boxes, a_exact, a_center, a, a_box)
+            nb = children_boxes(b_boxes, b_exact, b_center, b, b_box)
+            for g in range(na):
+                for h in range(nb):
+                    if not (own and a == b and g > h) and touch(a_box, g, b_box, h):
+                        stack[top, 0] = a_child[a, g] if a >= 0 else a
+                        stack[top, 1] = b_child[b, h] if b >= 0 else b
+                        top += 1
+            continue
+        first_a, first_b = -(a + 1), -(b + 1)
+        for i in range(first_a >> 3, (first_a >> 3) + (first_a & 7)):
+            for j in range(first_b >> 3, (first_b >> 3) + (first_b & 7)):
+                if (own and a == b and i >= j) or not touch(a_exact, i, b_exact, j):
+                    continue
+                if filled == capacity:
+                    capacity *= 2
+                    grown = np.empty((capacity, 2), np.int64)
+                    for p in range(filled):
+                        grown[p, 0], grown[p, 1] = pairs[p, 0], pairs[p, 1]
+                    pairs = grown
+                p, q = np.int64(a_index[i]), np.int64(b_index[j])
+                if own and p > q:
+                    p, q = q, p
+                pairs[filled, 0], pairs[filled, 1] = p, q
+                filled += 1
+    return pairs[:filled].copy()

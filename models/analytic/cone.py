@@ -1,0 +1,124 @@
+"""`Cone`: a line turned about an axis it meets."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from patchwright.models.analytic.arc import arc_net
+from patchwright.models.analytic.frame import (
+    TURN,
+    Range,
+    across,
+    bounded,
+    cosine,
+    interval,
+    parameters,
+    point,
+    sine,
+    unit,
+)
+from patchwright.models.arrays import Array
+from patchwright.models.errors import ParameterError
+from patchwright.models.nurbs_surface import NurbsSurface
+
+
+@dataclass(frozen=True, slots=True, eq=False, init=False)
+class Cone:
+    """S(u, v) = origin + r(v) (x cos u + y sin u) + v z with r(v) = ref_radius + v tan(half_angle); both nappes belong.
+
+    Where r(v) is negative the point lies on the second nappe, half a turn round.
+
+    Parameters
+    ----------
+    origin : (3,) the point of the axis where v = 0
+    axis : (3,), made unit: z
+    half_angle : between axis and line, in radians, in (-pi/2, pi/2), not 0
+    ref_radius : radius at the origin, at least 0
+    xdir : (3,) where u = 0, made unit and square to the axis: x; None for a deterministic one; y = z cross x
+    u : range of the angle in radians, at most one turn; None for (0, 2 pi)
+    v : range of the distance along the axis; None for unbounded
+
+    Raises
+    ------
+    ParameterError : a zero axis, a half angle or radius out of range, an empty or too long range.
+    """
+
+    origin: Array
+    axis: Array
+    half_angle: float
+    ref_radius: float
+    xdir: Array
+    u: Range
+    v: Range
+
+    def __init__(
+        self,
+        origin: npt.ArrayLike,
+        axis: npt.ArrayLike,
+        half_angle: float,
+        ref_radius: float = 0.0,
+        xdir: npt.ArrayLike | None = None,
+        u: Range | None = None,
+        v: Range | None = None,
+    ) -> None:
+        put = object.__setattr__
+        if not 0.0 < abs(half_angle) < 0.5 * math.pi:
+            raise ParameterError(f"the half angle must lie between 0 and pi/2 in size, got {half_angle}")
+        if not (math.isfinite(ref_radius) and ref_radius >= 0.0):
+            raise ParameterError(f"the reference radius must be at least 0 and finite, got {ref_radius}")
+        put(self, "origin", point(origin, "origin"))
+        put(self, "axis", unit(axis, "axis"))
+        put(self, "half_angle", float(half_angle))
+        put(self, "ref_radius", float(ref_radius))
+        put(self, "xdir", across(self.axis, xdir))
+        put(self, "u", interval(u, (0.0, TURN), "u", TURN))
+        put(self, "v", interval(v, (-math.inf, math.inf), "v"))
+
+    @property
+    def ydir(self) -> Array:
+        """(3,) where u is a quarter turn."""
+        return np.cross(self.axis, self.xdir)
+
+    @property
+    def domain(self) -> tuple[Range, Range]:
+        """((u0, u1), (v0, v1)); infinite where unbounded."""
+        return self.u, self.v
+
+    @property
+    def apex(self) -> Array:
+        """(3,) where the radius is zero."""
+        return np.asarray(self.origin - self.ref_radius / math.tan(self.half_angle) * self.axis)
+
+    def radius(self, v: npt.ArrayLike) -> Array:
+        """The signed radius at distances v along the axis."""
+        return np.asarray(self.ref_radius + math.tan(self.half_angle) * np.asarray(v, dtype=np.float64))
+
+    def __call__(self, u: npt.ArrayLike, v: npt.ArrayLike, nu: tuple[int, int] = (0, 0)) -> Array:
+        """(..., 3) the mixed derivative of order `nu` at broadcast parameters."""
+        us, vs = parameters(self.domain, u, v, nu)
+        a, b = nu
+        out = np.zeros((*us.shape, 3))
+        if b <= 1:
+            r = self.radius(vs)[..., None] if b == 0 else math.tan(self.half_angle)
+            out += r * (cosine(us, a) * self.xdir + sine(us, a) * self.ydir)
+        if a == 0 and b <= 1:
+            out += self.origin + vs[..., None] * self.axis if b == 0 else self.axis
+        return out
+
+    def to_nurbs(self) -> NurbsSurface:
+        """The bounded piece: rational quadratic in u, linear in v; the parameters agree at the knots.
+
+        Raises
+        ------
+        ParameterError : the piece is unbounded.
+        """
+        bounded(self.domain, "cone")
+        knots, net = arc_net(self.u)
+        w = np.repeat(net[:, 2:], 2, axis=1)
+        ring = (net[:, :1] * self.xdir + net[:, 1:2] * self.ydir) / net[:, 2:]
+        line = self.origin + np.array(self.v)[:, None] * self.axis
+        points = line + self.radius(self.v)[:, None] * ring[:, None]
+        return NurbsSurface((2, 1), (knots, np.repeat(self.v, 2)), points, w)

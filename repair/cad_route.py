@@ -1,0 +1,162 @@
+"""The ladder for CAD faces: keep them, sew round-off, or refuse with the places of what sewing cannot close.
+
+Faces are never touched: a kept face has the surface it came with, checked to 1e-12. The sewing tolerance is found from
+the data, and a seam counts as closed only by the distance measured between its two surfaces.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from patchwright.models.arrays import Array
+from patchwright.models.assembly import Assembly
+from patchwright.models.cad.seams import measure_seams
+from patchwright.models.cad.sewing import SewnResult, free_edge_curve, sew
+from patchwright.models.tolerance import Tolerance
+from patchwright.models.triangulation import Triangulation
+from patchwright.repair.cad_grid import cad_grid
+from patchwright.repair.deviation import two_sided
+from patchwright.repair.diagnosing import diagnose
+from patchwright.repair.diagnosis import Defect, Diagnosis
+from patchwright.repair.result import Face, LedgerEntry, Point, Problem, Progress, Repaired, Rung, Seam, Verdict
+from patchwright.repair.weld import weld
+
+SHARES = np.array([1e-8, 1e-7, 1e-6, 1e-5, 1e-4])  # of the diagonal: sewing tolerances tried, smallest first
+SEAM_SHARE = 1e-6  # of the diagonal: the widest seam between kept faces that is closed
+UNCHANGED = 1e-12  # of the diagonal: a kept surface's numbers may differ by round-off only
+LEFT = {"opening", "parametrisation", "component", "thin", "unit", "far-field", "seam-angle", "loose-tolerance"}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Outcome:
+    """The assembly after keeping and sewing, with the words for the ledger."""
+
+    assembly: Assembly
+    sewn: SewnResult | None
+    reason: str
+
+
+def repair_cad(model: Assembly, tolerance: Tolerance, *, openings: str, diagnosis: Diagnosis, progress: Progress) -> Repaired:
+    """Keep the faces of a CAD model and sew them where only round-off separates them.
+
+    A model with gaps, crossing faces or invalid faces is refused; `scope="all"` resurfaces its tessellation instead.
+    """
+    progress("sewing", 0.2)
+    outcome = _sewn(model)
+    after = diagnosis
+    if outcome.sewn is not None:
+        progress("checking the sewn shell", 0.6)
+        after = diagnose(outcome.assembly, tolerance=tolerance)
+    problems = tuple(_problem(d) for d in after.defects if d.severity == "error" and d.kind not in LEFT)
+    if openings == "close":
+        problems += tuple(
+            _problem(d, "closing openings of CAD faces is not possible yet; --scope all closes them on the tessellation")
+            for d in after.defects
+            if d.kind == "opening"
+        )
+    ledger = _ledger(model, outcome, diagnosis, after)
+    body, deviation = _triangulated(outcome.assembly, tolerance), None
+    if problems:
+        return Repaired(Verdict.REFUSED, (), (), body, ledger, None, 0.0, problems, Assembly((), model.unit, model.source))
+    progress("measuring seams", 0.8)
+    seams = _seams(outcome.assembly, tolerance)
+    grid, without = cad_grid(outcome.assembly)
+    if without and grid is not None:
+        ledger += (LedgerEntry("faces without a grid block", Rung.KEEP, without, "they are not four-sided", count=len(without)),)
+    deviation = two_sided(model.triangulation, body, tolerance.fit)
+    verdict = Verdict.CLEAN if outcome.sewn is None else Verdict.REPAIRED
+    rung = Rung.KEEP if outcome.sewn is None else Rung.WELD
+    faces = tuple(
+        Face(p.name, (p.name,), rung, 0.0, 0.0, float(p.triangulation.areas.sum())) for p in outcome.assembly.parts
+    )
+    return Repaired(
+        verdict, faces, seams, body, ledger, deviation, 0.0, (), outcome.assembly, grid=grid,
+        figures=_figures(outcome.assembly, seams, grid is not None and len(grid.blocks) or 0, after),
+    )
+
+
+def _free_edges(assembly: Assembly) -> int:
+    topology = assembly.topology
+    if topology is None:
+        return len(assembly.parts)
+    lengths = np.array([np.ptp(c(np.linspace(*c.domain, 5)), axis=0).max() for c in topology.curves])
+    return int(((topology.use_counts() == 1) & (lengths > 0.0)).sum())
+
+
+def _sewn(model: Assembly) -> _Outcome:
+    """The model sewn at the smallest tolerance that closes all that round-off keeps open, or as it came."""
+    free = _free_edges(model)
+    if free == 0:
+        return _Outcome(model, None, "every edge is shared already")
+    curve = free_edge_curve(model, SHARES * model.diagonal)
+    counts = ", ".join(f"{n} at {t:.1g}" for t, n in zip(curve.tolerances, curve.free, strict=True))
+    tried = [int(np.flatnonzero(curve.free == n)[0]) for n in np.unique(curve.free) if n < free]
+    for k in tried:  # fewest free edges first, each at its smallest tolerance
+        result = sew(model, float(curve.tolerances[k]))
+        if result.dropped or result.surface_change.max(initial=0.0) > UNCHANGED * max(model.diagonal, 1.0):
+            continue
+        gaps = [s.gap for s in measure_seams(result.assembly)]
+        if max(gaps, default=0.0) <= SEAM_SHARE * model.diagonal:
+            reason = f"{free} free edges become {result.free_edges}; free edges by tolerance: {counts}"
+            return _Outcome(result.assembly, result, reason)
+    return _Outcome(model, None, f"no tolerance up to {curve.tolerances[-1]:.3g} closes a seam whose surfaces meet; {counts}")
+
+
+def _problem(defect: Defect, message: str = "") -> Problem:
+    return Problem(defect.kind, _point(defect.where), float(defect.size), message or defect.message)
+
+
+def _ledger(model: Assembly, outcome: _Outcome, before: Diagnosis, after: Diagnosis) -> tuple[LedgerEntry, ...]:
+    area = float(sum(p.triangulation.areas.sum() for p in model.parts))
+    entries = [LedgerEntry("CAD faces kept", Rung.KEEP, (), "their surfaces are identical", count=len(model.parts), area=area)]
+    if outcome.sewn is not None:
+        change = float(outcome.sewn.surface_change.max(initial=0.0))
+        entries.append(
+            LedgerEntry("edges sewn", Rung.WELD, (), outcome.reason, count=_free_edges(model) - outcome.sewn.free_edges,
+                        tolerance=outcome.sewn.tolerance, largest_move=change)
+        )
+    else:
+        entries.append(LedgerEntry("edges left as they were", Rung.KEEP, (), outcome.reason, count=0))
+    for defect in after.defects:
+        if defect.kind in LEFT and defect.severity != "info":
+            entries.append(
+                LedgerEntry(f"{defect.kind} left", Rung.KEEP, tuple(defect.parts), defect.message, count=int(defect.count),
+                            where=_point(defect.where))
+            )
+    return tuple(entries)
+
+
+def _point(where: Array | Point) -> Point:
+    x, y, z = np.asarray(where, dtype=np.float64).tolist()
+    return x, y, z
+
+
+def _triangulated(assembly: Assembly, tolerance: Tolerance) -> Triangulation:
+    """All faces' triangles, tagged by name, points on shared edges stored once."""
+    return weld(assembly.triangulation, tolerance.gap).triangulation
+
+
+def _seams(assembly: Assembly, tolerance: Tolerance) -> tuple[Seam, ...]:
+    return tuple(
+        Seam(s.faces, s.gap, s.angle, "sharp" if s.angle > tolerance.angle else "smooth", s.length, s.at)
+        for s in measure_seams(assembly)
+    )
+
+
+def _figures(assembly: Assembly, seams: tuple[Seam, ...], blocks: int, after: Diagnosis) -> dict[str, float | int | str | bool]:
+    smooth = np.array([s.angle for s in seams if s.kind == "smooth"] or [0.0])
+    free = _free_edges(assembly)
+    return {
+        "faces": len(assembly.parts),
+        "grid blocks": blocks,
+        "closed": free == 0,
+        "free edges": free,
+        "openings kept": len(after.of("opening")),
+        "largest seam gap": max((s.gap for s in seams), default=0.0),
+        "largest smooth seam angle": float(smooth.max()),
+        "median smooth seam angle": float(np.median(smooth)),
+    }
+
+

@@ -1,0 +1,120 @@
+"""The first stages of mending: weld copies, drop doubles, make seams conform, orient; nothing is invented."""
+
+from __future__ import annotations
+
+import numpy as np
+from patchwright.models.adjacency import Adjacency
+from patchwright.models.arrays import Array
+from patchwright.models.triangulation import Triangulation
+from patchwright.repair.clean import drop_collapsed, drop_duplicates, split_non_manifold
+from patchwright.repair.conform import conform
+from patchwright.repair.mended import Action, Work, middle
+from patchwright.repair.orient import orient
+from patchwright.repair.weld import contract_short, weld, weld_distance
+
+
+def weld_copies(work: Work) -> None:
+    distance, reason = weld_distance(work.now, work.tolerance)
+    welded = weld(work.now, distance)
+    work.noise, work.distance = welded.noise, distance
+    work.now = welded.triangulation
+    if welded.merged:
+        work.actions.append(
+            Action(
+                "weld", "weld", middle(work.now), work.now.diagonal, distance, reason, welded.merged,
+                welded.largest_move,
+            )
+        )  # fmt: skip
+
+    if distance > work.tolerance.gap:
+        _below_noise(work, distance)
+
+
+def _below_noise(work: Work, distance: float) -> None:
+    """Data with scatter: edges shorter than the scatter cannot be told apart; they go, and what hangs on them."""
+    for _ in range(3):
+        short = contract_short(work.now, distance)
+        if not short.merged:
+            break
+        work.now = short.triangulation
+        cleaned = drop_collapsed(work.now)
+        work.drop("triangles smaller than the noise", f"an edge is shorter than {distance:.3g}", cleaned.removed)
+        work.follow(cleaned.triangulation, cleaned.parents)
+        work.now = weld(work.now, distance).triangulation
+    _undouble(work)
+    adjacency = Adjacency.of(work.now)
+    height = 2.0 * work.now.areas / np.maximum(_longest(work.now), np.finfo(float).tiny)
+    crowded = adjacency.non_manifold[adjacency.triangle_edges].any(axis=1) & (height < 2.0 * distance)
+    if crowded.any():
+        gone = np.flatnonzero(crowded)
+        work.drop("triangles smaller than the noise", "more than two of them meet at an edge", gone)
+        left = np.flatnonzero(~crowded)
+        work.follow(work.now.take(left), left)
+
+
+def clean(work: Work) -> None:
+    cleaned = drop_collapsed(work.now)
+    work.drop("collapsed triangles", "two of their corners are one point", cleaned.removed)
+    work.follow(cleaned.triangulation, cleaned.parents)
+    _undouble(work)
+
+
+def _undouble(work: Work) -> None:
+    cleaned = drop_duplicates(work.now)
+    work.drop("doubled triangles", "the same three corners as another triangle", cleaned.removed)
+    work.follow(cleaned.triangulation, cleaned.parents)
+
+
+def conform_seams(work: Work) -> None:
+    if not Adjacency.of(work.now).free.any():
+        return
+    distance = work.tolerance.fit
+    first = weld(work.now, distance)
+    conformed = conform(first.triangulation, distance)
+    if not (first.merged or conformed.inserted):
+        return
+    if first.merged:
+        reason = f"rim vertices that meet within the fit tolerance ({distance:.3g}); what is farther apart is a gap"
+        work.actions.append(
+            Action(
+                "weld", "weld", middle(work.now), work.now.diagonal, distance, reason, first.merged,
+                first.largest_move,
+            )
+        )  # fmt: skip
+    work.now = first.triangulation
+    work.follow(conformed.triangulation, conformed.parents, conformed.cut)
+    if conformed.inserted:
+        reason = "rim vertices that lie on another free edge split it"
+        work.actions.append(
+            Action(
+                "conform", "weld", middle(work.now), work.now.diagonal, distance, reason, conformed.inserted,
+                conformed.largest_bend,
+            )
+        )  # fmt: skip
+    clean(work)
+
+
+def orient_bodies(work: Work) -> None:
+    before = len(work.now.vertices)
+    work.now = split_non_manifold(work.now, vertices=False)
+    if len(work.now.vertices) > before:
+        reason = "edges with more than two triangles: those that enclose material stay joined"
+        work.actions.append(
+            Action(
+                "split", "weld", middle(work.now), work.now.diagonal, 0.0, reason, len(work.now.vertices) - before
+            )
+        )  # fmt: skip
+    oriented = orient(work.now)
+    if oriented.flipped.any():
+        some = work.now.take(oriented.flipped)
+        reason = "triangles run against their neighbours, or the body faced inward"
+        work.actions.append(
+            Action("orient", "keep", middle(some), some.diagonal, 0.0, reason, int(oriented.flipped.sum()))
+        )
+    work.now = oriented.triangulation
+
+
+def _longest(triangulation: Triangulation) -> Array:
+    """(m,) longest edge of each triangle."""
+    corners = triangulation.corners
+    return np.asarray(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1, initial=0.0))

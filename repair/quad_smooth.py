@@ -1,0 +1,55 @@
+"""Quads made square: vertices move over the surface, on their feature curve or not at all, never spoiling a quad.
+
+A plain mean of the neighbours where that does no harm; where a quad is poor, the best place among some tried ones
+(smart Laplacian and pattern search on the least scaled Jacobian round the vertex).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from patchwright.models.arrays import Array, IntArray
+from patchwright.repair.pairing import QuadMesh
+
+ROUNDS = 4  # normals at the quads' centres are renewed between rounds
+PASSES = 6  # over all vertices in a round
+GOAL = 0.6  # scaled Jacobian that evening out may go down to
+
+
+def smooth(quad_mesh: QuadMesh, *, rounds: int = ROUNDS) -> None:
+    """Move the vertices of `quad_mesh` in place."""
+    from patchwright.repair import _quad_kernel as kernel
+
+    mesh, ground, quads = quad_mesh.mesh, quad_mesh.ground, np.ascontiguousarray(quad_mesh.quads)
+    n = len(mesh.X)
+    offsets, around = _csr(quads.reshape(-1), np.repeat(np.arange(len(quads)), 4), n)
+    one, two = quads.reshape(-1), np.roll(quads, -1, axis=1).reshape(-1)
+    key = np.unique(np.minimum(one, two) * n + np.maximum(one, two))
+    lo, hi = key // n, key % n
+    near_offsets, near = _csr(np.concatenate([lo, hi]), np.concatenate([hi, lo]), n)
+    low, high = np.full(n, -1, dtype=np.int64), np.full(n, -1, dtype=np.int64)
+    high[quad_mesh.sides[:, 0]] = quad_mesh.sides[:, 1]
+    low[quad_mesh.sides[:, 1]] = quad_mesh.sides[:, 0]
+    for _ in range(rounds):
+        kernel.update_outward(mesh, ground, quads, quad_mesh.region, quad_mesh.outward)
+        kernel.smooth_quads(
+            mesh, ground, quads, quad_mesh.outward, offsets, around, near_offsets, near, low, high, GOAL, PASSES
+        )
+    kernel.update_outward(mesh, ground, quads, quad_mesh.region, quad_mesh.outward)
+
+
+def scaled_jacobians(quad_mesh: QuadMesh) -> Array:
+    """(m,) least sine of each quad's corner angles along the surface normal; -1 for a quad turned against the surface."""
+    from patchwright.repair import _quad_kernel as kernel
+
+    out = np.empty(len(quad_mesh.quads))
+    kernel.all_qualities(quad_mesh.mesh, np.ascontiguousarray(quad_mesh.quads), quad_mesh.outward, out)
+    return out
+
+
+def _csr(owner: IntArray, values: IntArray, count: int) -> tuple[Any, Any]:
+    order = np.argsort(owner, kind="stable")
+    offsets = np.concatenate([[0], np.cumsum(np.bincount(owner, minlength=count))])
+    return offsets.astype(np.int64), np.ascontiguousarray(values[order], dtype=np.int64)
