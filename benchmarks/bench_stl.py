@@ -1,4 +1,4 @@
-"""STL of 1e6 triangles: read with equal corners merged, and written, beside VTK (pyvista) and trimesh; growth of the cost.
+"""STL of 1e6 triangles: read with equal corners merged, and written, beside VTK and trimesh; growth of the cost.
 
 Run: pytest benchmarks/bench_stl.py --benchmark-only -m "slow or not slow"
 """

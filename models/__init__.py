@@ -1,4 +1,5 @@
-"""The geometry everything works on: curves, surfaces, triangulations, grids, assemblies and the tolerances they imply."""
+"""The geometry everything works on: curves, surfaces, triangulations, grids, assemblies and the tolerances they
+imply."""
 
 from patchwright.models.analytic import Cone, Cylinder, Plane, Sphere, Torus
 from patchwright.models.assembly import Assembly, Part

@@ -1,9 +1,11 @@
-"""Kernel of the closest point on a NURBS surface: damped Newton steps inside the domain's box, one point after another."""
+"""Kernel of the closest point on a NURBS surface: damped Newton steps inside the domain's box, one point after
+another."""
 
 from __future__ import annotations
 
 import numpy as np
 from numba import njit
+
 from patchwright.models._nurbs_kernel import find_span, general_sums, quotient
 from patchwright.models.arrays import Array, IntArray
 
@@ -22,11 +24,12 @@ def polish(
     size: float,
     steps: int,
 ) -> tuple[Array, IntArray]:
-    """Foot points (k, 2) from the starts uv (k, 2), and a status each: 0 square, 1 stopped on the boundary, 2 not settled.
+    """Foot points (k, 2) from the starts uv (k, 2), and a status each: 0 square, 1 stopped on the boundary, 2 not
+    settled.
 
-    Minimises f = |S(u, v) - P|^2 / 2. `box` is [[u0, u1], [v0, v1]], `closed` marks directions that wrap round, `size` is a length
-    of the surface; a Newton step below 1e-14 of it ends the search. Where the Hessian is not positive on the free directions, or a step would
-    go uphill, Gauss-Newton with Levenberg's damping takes over.
+    Minimises f = |S(u, v) - P|^2 / 2. `box` is [[u0, u1], [v0, v1]], `closed` marks directions that wrap round,
+    `size` is a length of the surface; a Newton step below 1e-14 of it ends the search. Where the Hessian is not
+    positive on the free directions, or a step would go uphill, Gauss-Newton with Levenberg's damping takes over.
     """
     n = net.shape[0]
     m = net.shape[1]

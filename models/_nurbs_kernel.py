@@ -1,14 +1,16 @@
 """Kernels of NURBS evaluation and knot insertion; their readable definitions are the oracles in the tests.
 
 Letters follow Piegl and Tiller, The NURBS Book (2nd ed. 1997): degrees p and q, knot vectors U and V, spans i with
-U[i] <= u < U[i+1]. Basis rows are raised degree by degree (A2.2); a derivative of order r raises the last r degrees with the
-derivative formula (2.9) instead, so no triangular tables are kept. Nets are homogeneous, (x w, y w, z w, w), or plain.
+U[i] <= u < U[i+1]. Basis rows are raised degree by degree (A2.2); a derivative of order r raises the last r degrees
+with the derivative formula (2.9) instead, so no triangular tables are kept. Nets are homogeneous, (x w, y w, z w,
+w), or plain.
 """
 
 from __future__ import annotations
 
 import numpy as np
 from numba import njit
+
 from patchwright.models.arrays import Array, IntArray
 
 
@@ -151,10 +153,12 @@ def tensor_product(
 
 @njit(cache=True, nogil=True)
 def cubic_table(U: Array, n: int, low: int, high: int) -> Array:
-    """(n, high + 1 - low, 4, 4) the derivatives low..high of the four cubics of each span as powers of its own t in [0, 1].
+    """(n, high + 1 - low, 4, 4) the derivatives low..high of the four cubics of each span as powers of its own t in
+    [0, 1].
 
-    The cubics lie in [0, 1] on their span, so the coefficients stay below 48 however unequal the knots are, and a sum of
-    powers costs no divisions. [span, order - low, power, basis function]; span 0, which is none, holds the values at the domain's end.
+    The cubics lie in [0, 1] on their span, so the coefficients stay below 48 however unequal the knots are, and a
+    sum of powers costs no divisions. [span, order - low, power, basis function]; span 0, which is none, holds the
+    values at the domain's end.
     """
     table = np.zeros((n, high + 1 - low, 4, 4))
     row = np.empty((1, 4))
@@ -192,21 +196,26 @@ def cubic_basis(c: Array, i: int, e: int, t: float) -> tuple[float, float, float
     )
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, inline="always")
 def bicubic_sum(
     net: Array, i: int, j: int, x: int, a: tuple[float, float, float, float], b: tuple[float, float, float, float]
 ) -> float:
     """Coordinate x of the sum of a[r] b[s] net[i + r, j + s] over the 4 x 4 active points."""
-    total = 0.0
-    for r in range(4):
-        row = b[0] * net[i + r, j, x] + b[1] * net[i + r, j + 1, x]
-        total += a[r] * (row + b[2] * net[i + r, j + 2, x] + b[3] * net[i + r, j + 3, x])
-    return total
+    k = j + 1
+    m = j + 2
+    o = j + 3
+    return (
+        a[0] * (b[0] * net[i, j, x] + b[1] * net[i, k, x] + b[2] * net[i, m, x] + b[3] * net[i, o, x])
+        + a[1] * (b[0] * net[i + 1, j, x] + b[1] * net[i + 1, k, x] + b[2] * net[i + 1, m, x] + b[3] * net[i + 1, o, x])
+        + a[2] * (b[0] * net[i + 2, j, x] + b[1] * net[i + 2, k, x] + b[2] * net[i + 2, m, x] + b[3] * net[i + 2, o, x])
+        + a[3] * (b[0] * net[i + 3, j, x] + b[1] * net[i + 3, k, x] + b[2] * net[i + 3, m, x] + b[3] * net[i + 3, o, x])
+    )
 
 
 @njit(cache=True, nogil=True)
 def bicubic_points(U: Array, V: Array, net: Array, u: Array, v: Array) -> Array:
-    """(k, 3) points of a rational bicubic net (n, m, 4) at the parameters u, v, each (k,): the case that is asked for most."""
+    """(k, 3) points of a rational bicubic net (n, m, 4) at the parameters u, v, each (k,): the case that is asked
+    for most."""
     n = net.shape[0]
     m = net.shape[1]
     out = np.empty((u.shape[0], 3))
@@ -217,20 +226,10 @@ def bicubic_points(U: Array, V: Array, net: Array, u: Array, v: Array) -> Array:
         j = find_span(V, 3, m, v[k])
         a = cubic_basis(table_u, 0 if u[k] == U[i + 1] else i, 0, (u[k] - U[i]) / (U[i + 1] - U[i]))
         b = cubic_basis(table_v, 0 if v[k] == V[j + 1] else j, 0, (v[k] - V[j]) / (V[j + 1] - V[j]))
-        x = 0.0
-        y = 0.0
-        z = 0.0
-        w = 0.0
-        for r in range(4):
-            e = i - 3 + r
-            x += a[r] * (b[0] * net[e, j - 3, 0] + b[1] * net[e, j - 2, 0] + b[2] * net[e, j - 1, 0] + b[3] * net[e, j, 0])
-            y += a[r] * (b[0] * net[e, j - 3, 1] + b[1] * net[e, j - 2, 1] + b[2] * net[e, j - 1, 1] + b[3] * net[e, j, 1])
-            z += a[r] * (b[0] * net[e, j - 3, 2] + b[1] * net[e, j - 2, 2] + b[2] * net[e, j - 1, 2] + b[3] * net[e, j, 2])
-            w += a[r] * (b[0] * net[e, j - 3, 3] + b[1] * net[e, j - 2, 3] + b[2] * net[e, j - 1, 3] + b[3] * net[e, j, 3])
-        scale = 1.0 / w
-        out[k, 0] = x * scale
-        out[k, 1] = y * scale
-        out[k, 2] = z * scale
+        scale = 1.0 / bicubic_sum(net, i - 3, j - 3, 3, a, b)
+        out[k, 0] = scale * bicubic_sum(net, i - 3, j - 3, 0, a, b)
+        out[k, 1] = scale * bicubic_sum(net, i - 3, j - 3, 1, a, b)
+        out[k, 2] = scale * bicubic_sum(net, i - 3, j - 3, 2, a, b)
     return out
 
 
@@ -239,7 +238,8 @@ def general_sums(
     U: Array, p: int, i: int, u: float, V: Array, q: int, j: int, v: float, net: Array,
     a: tuple[int, int], b: tuple[int, int], rows_u: Array, rows_v: Array, sums: Array,
 ) -> None:  # fmt: skip
-    """sums[e, f, :] = derivative (e, f) of the net's sum at (u, v) in span (i, j), for e in range(*a) and f in range(*b)."""
+    """sums[e, f, :] = derivative (e, f) of the net's sum at (u, v) in span (i, j), for e in range(*a) and f in
+    range(*b)."""
     d = net.shape[2]
     for e in range(a[0], a[1]):
         basis_row(U, p, i, u, e, rows_u, e)
@@ -280,12 +280,12 @@ def scattered(
 ) -> Array:
     """(k, a, b, 3) derivatives of orders lowest..order in u and v at the scattered parameters (u, v), each (k,).
 
-    A net of (n, m, 4) is homogeneous: the quotient rule (4.20) then needs all lower orders, which are worked out on the way.
+    A net of (n, m, 4) is homogeneous: the quotient rule (4.20) then needs all lower orders, which are worked out on
+    the way.
     """
     n = net.shape[0]
     m = net.shape[1]
-    d = net.shape[2]
-    rational = d == 4
+    rational = net.shape[2] == 4
     cubic = p == 3 and q == 3
     a0 = 0 if rational else lowest[0]
     b0 = 0 if rational else lowest[1]
@@ -314,8 +314,11 @@ def scattered(
                 a = cubic_basis(table_u, i_table, e - a0, t_u)
                 for f in range(b0, b1):
                     b = cubic_basis(table_v, j_table, f - b0, t_v)
-                    for c in range(d):
-                        sums[e, f, c] = bicubic_sum(net, i - 3, j - 3, c, a, b)
+                    sums[e, f, 0] = bicubic_sum(net, i - 3, j - 3, 0, a, b)
+                    sums[e, f, 1] = bicubic_sum(net, i - 3, j - 3, 1, a, b)
+                    sums[e, f, 2] = bicubic_sum(net, i - 3, j - 3, 2, a, b)
+                    if rational:
+                        sums[e, f, 3] = bicubic_sum(net, i - 3, j - 3, 3, a, b)
         else:
             general_sums(U, p, i, u[k], V, q, j, v[k], net, (a0, a1), (b0, b1), rows_u, rows_v, sums)
         if rational:

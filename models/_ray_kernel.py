@@ -123,8 +123,10 @@ def first_hits(
     for r in order:
         dx, dy, dz = directions[r, 0], directions[r, 1], directions[r, 2]
         longest = max(max(abs(dx), abs(dy)), abs(dz))
-        direction[0], direction[1], direction[2] = dx / longest, dy / longest, dz / longest
-        length = np.sqrt(direction[0] ** 2 + direction[1] ** 2 + direction[2] ** 2)
+        if not 1e-100 < longest < 1e100:
+            dx, dy, dz = dx / longest, dy / longest, dz / longest
+        direction[0], direction[1], direction[2] = dx, dy, dz
+        length = np.sqrt(dx * dx + dy * dy + dz * dz)
         kx, ky, kz, sx, sy, sz = ray_frame(direction)
         ox, oy, oz = origins[r, kx], origins[r, ky], origins[r, kz]
         px, py, pz = origins[r, 0] - center[0], origins[r, 1] - center[1], origins[r, 2] - center[2]

@@ -190,18 +190,31 @@ def gather(vertices: Array, triangles: IntArray, order: Index) -> Array:
 
 
 @njit(cache=True, nogil=True)
-def morton_order(points: Array) -> IntArray:
-    """(n,) an order in which successive points are near: 30-bit Morton codes, sorted by three radix passes."""
-    n = points.shape[0]
-    low = np.full(3, np.inf)
-    extent = 0.0
+def extent(points: Array, low: Array) -> float:
+    """The longest side of the box of `points`, whose lower corner goes to `low` (3,)."""
+    high = low.copy()
     for k in range(3):
-        high = -np.inf
-        for i in range(n):
+        low[k], high[k] = np.inf, -np.inf
+    for i in range(points.shape[0]):
+        for k in range(3):
             low[k] = min(low[k], points[i, k])
-            high = max(high, points[i, k])
-        extent = max(extent, high - low[k])
-    scale = 1023.0 / extent if 0.0 < extent < np.inf else 0.0
+            high[k] = max(high[k], points[i, k])
+    return max(max(high[0] - low[0], high[1] - low[1]), high[2] - low[2])
+
+
+@njit(cache=True, nogil=True)
+def morton_order(points: Array, otherwise: Array, least: float) -> IntArray:
+    """(n,) an order in which successive points are near: 30-bit Morton codes, sorted by three radix passes.
+
+    Where all `points` lie within `least`, the order is that of the points `otherwise`.
+    """
+    n = points.shape[0]
+    low = np.empty(3)
+    size = extent(points, low)
+    if size <= least:
+        points = otherwise
+        size = extent(points, low)
+    scale = 1023.0 / size if 0.0 < size < np.inf else 0.0
     code = np.zeros(n, np.int64)
     for i in range(n):
         for k in range(3):

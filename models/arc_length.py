@@ -1,8 +1,8 @@
 """Arc length of a curve and its inverse, with error control.
 
-Every span is integrated by the 15-point Gauss-Legendre rule and halved until the halves agree with the whole, so that cusps and
-unequal parametrisations cost only local refinement. The accepted intervals are a table; lengths and parameters are looked up
-in it and finished by the same rule, the inverse by Newton's method kept inside its interval.
+Every span is integrated by the 15-point Gauss-Legendre rule and halved until the halves agree with the whole, so
+that cusps and unequal parametrisations cost only local refinement. The accepted intervals are a table; lengths and
+parameters are looked up in it and finished by the same rule, the inverse by Newton's method kept inside its interval.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from functools import cache
 
 import numpy as np
 import numpy.typing as npt
+
 from patchwright.models.arrays import Array
 from patchwright.models.errors import ParameterError
 from patchwright.models.knots import inside
@@ -98,7 +99,8 @@ class ArcLength:
         return np.asarray((self.lengths[k] + _rule(self.curve, self.knots[k], flat)).reshape(at.shape))
 
     def parameter(self, s: npt.ArrayLike) -> Array:
-        """Parameters of any shape where the arc length from the start is s; the first of them where the curve stands still.
+        """Parameters of any shape where the arc length from the start is s; the first of them where the curve stands
+        still.
 
         Raises
         ------

@@ -1,8 +1,9 @@
 """Closest points on NURBS curves and surfaces, and their parameters (point inversion), vectorised over points.
 
-The start is the nearest of a sampling of every span; up to two more samples among the nearest, none a neighbour of another, are tried
-as well, for shapes that come close more than once. Damped Newton steps inside the domain finish them and the closest foot wins. The answer is
-the global minimum wherever the sampling separates the shape's branches; `samples` makes it denser.
+The start is the nearest of a sampling of every span; up to two more samples among the nearest, none a neighbour of
+another, are tried as well, for shapes that come close more than once. Damped Newton steps inside the domain finish
+them and the closest foot wins. The answer is the global minimum wherever the sampling separates the shape's
+branches; `samples` makes it denser.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from enum import IntEnum
 
 import numpy as np
 import numpy.typing as npt
+
 from patchwright.models.arrays import Array, IntArray
 from patchwright.models.errors import ParameterError
 from patchwright.models.knots import locked
@@ -78,7 +80,8 @@ def closest_on_surface(
     Parameters
     ----------
     points : (k, 3)
-    start : (k, 2) parameters to start from: only the minimum they lead to is found, several times faster; None for a search
+    start : (k, 2) parameters to start from: only the minimum they lead to is found, several times faster; None for a
+    search
     samples : per span and direction, for the search
 
     Raises
@@ -238,14 +241,16 @@ def _samples(ts: Array, count: int) -> Array:
 
 
 def _kept(rows: Array, size: float) -> npt.NDArray[np.bool_]:
-    """All rows of samples (k, l, 3) but those at an end that is one point: there the search would not know which way to go."""
+    """All rows of samples (k, l, 3) but those at an end that is one point: there the search would not know which way
+    to go."""
     keep = np.ones(rows.shape[0], dtype=bool)
     keep[[0, -1]] = np.ptp(rows[[0, -1]], axis=1).max(axis=1) > CLOSED_SHARE * size
     return keep
 
 
 def _starts(cells: Array, queries: Array, shape: tuple[int, int], closed: tuple[bool, bool]) -> list[IntArray]:
-    """For each query the nearest sample, then the next nearest that is no neighbour of those before, or -1, up to three."""
+    """For each query the nearest sample, then the next nearest that is no neighbour of those before, or -1, up to
+    three."""
     from scipy.spatial import cKDTree
 
     count = min(NEAREST, cells.shape[0])

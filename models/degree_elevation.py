@@ -2,13 +2,15 @@
 
 The new control point of degree p + 1 is the blossom of the raised polynomial at the new knots that follow it,
 F(t_1, ..., t_{p+1}) = mean over i of f(t_1, ..., without t_i, ..., t_{p+1}), with f the blossom of the old one
-(Ramshaw, Blossoms are polar forms, CAGD 6 (1989), 323-358, section 6; doi:10.1016/0167-8396(89)90032-0). The polynomial is the one of the
-longest span under the new basis function, and the arguments furthest from it go first, so that extrapolation stays small.
+(Ramshaw, Blossoms are polar forms, CAGD 6 (1989), 323-358; doi:10.1016/0167-8396(89)90032-0). The
+polynomial is the one of the longest span under the new basis function, and the arguments furthest from it go first,
+so that extrapolation stays small.
 """
 
 from __future__ import annotations
 
 import numpy as np
+
 from patchwright.models.arrays import Array, IntArray
 from patchwright.models.knots import breaks, distinct, restrict
 

@@ -1,4 +1,5 @@
-"""Normals and curvatures of any surface with the call protocol; poles and creases have the limit from inside the domain.
+"""Normals and curvatures of any surface with the call protocol; poles and creases have the limit from inside the
+domain.
 
 Reference: do Carmo, Differential Geometry of Curves and Surfaces, 1976, chapters 2 and 3.
 """
@@ -9,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+
 from patchwright.models.arrays import Array
 from patchwright.models.surface import Surface
 
@@ -45,8 +47,8 @@ class Curvature:
 def normals(surface: Surface, u: npt.ArrayLike, v: npt.ArrayLike) -> Array:
     """(..., 3) unit normals S_u x S_v / |S_u x S_v| at broadcast parameters.
 
-    Where the cross product vanishes (a pole, a collapsed edge, parallel tangents) the limit along the way to the middle of the domain
-    is given; NaN where the surface has no normal there either.
+    Where the cross product vanishes (a pole, a collapsed edge, parallel tangents) the limit along the way to the
+    middle of the domain is given; NaN where the surface has no normal there either.
     """
     us, vs = (np.array(x, dtype=np.float64) for x in np.broadcast_arrays(u, v))
     shape = us.shape
@@ -100,7 +102,8 @@ def _limit(surface: Surface, u: Array, v: Array) -> Array:
 
 
 def _unit_cross(surface: Surface, su: Array, sv: Array) -> tuple[Array, npt.NDArray[np.bool_]]:
-    """Unit cross products and where they are to be trusted: not parallel, and no tangent lost in the other's round-off."""
+    """Unit cross products and where they are to be trusted: not parallel, and no tangent lost in the other's
+    round-off."""
     (low_u, high_u), (low_v, high_v) = surface.domain
     width = high_u - low_u if np.isfinite(high_u - low_u) else 1.0
     height = high_v - low_v if np.isfinite(high_v - low_v) else 1.0
@@ -118,7 +121,8 @@ def _unit_cross(surface: Surface, su: Array, sv: Array) -> tuple[Array, npt.NDAr
 def curvature(surface: Surface, u: npt.ArrayLike, v: npt.ArrayLike) -> Curvature:
     """Principal curvatures and directions at broadcast parameters.
 
-    Where the tangents vanish or are parallel the values are those of a point 1e-4 of the domain further inside; NaN where that has none either.
+    Where the tangents vanish or are parallel the values are those of a point 1e-4 of the domain further inside; NaN
+    where that has none either.
     """
     us, vs = (np.array(x, dtype=np.float64) for x in np.broadcast_arrays(u, v))
     shape = us.shape

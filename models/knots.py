@@ -1,13 +1,14 @@
 """Knot vectors: their checks, distinct knots and multiplicities, and the knots other representations need.
 
-The domain of degree p on n control points is [U[p], U[n]]; knots need not be clamped. Inserting knots never changes the shape.
-Letters follow Piegl and Tiller, The NURBS Book (2nd ed. 1997).
+The domain of degree p on n control points is [U[p], U[n]]; knots need not be clamped. Inserting knots never changes
+the shape. Letters follow Piegl and Tiller, The NURBS Book (2nd ed. 1997).
 """
 
 from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
+
 from patchwright.models.arrays import Array, IntArray, frozen
 from patchwright.models.errors import KnotError, ParameterError
 
@@ -170,9 +171,9 @@ def mirrored(knots: Array, low: float, high: float) -> Array:
 def unrolled(degree: int, values: npt.ArrayLike, multiplicities: npt.ArrayLike, count: int) -> tuple[Array, IntArray]:
     """Full knots, and the indices of the `count` periodic control points to use with them.
 
-    The convention is that of STEP, IGES readers and CAD kernels: distinct knots over one period, both ends included and of
-    the same multiplicity k <= degree, count = the sum of all multiplicities but the last; the first control point belongs to
-    the first basis function that is not zero on the first span.
+    The convention is that of STEP, IGES readers and CAD kernels: distinct knots over one period, both ends included
+    and of the same multiplicity k <= degree, count = the sum of all multiplicities but the last; the first control
+    point belongs to the first basis function that is not zero on the first span.
 
     Raises
     ------

@@ -1,4 +1,5 @@
-"""`NurbsCurve`: a rational or plain B-spline curve of any degree in any dimension (2-D curves in a (u, v) plane included).
+"""`NurbsCurve`: a rational or plain B-spline curve of any degree in any dimension (2-D curves in a (u, v) plane
+included).
 
 Reference: Piegl and Tiller, The NURBS Book, 2nd ed. 1997. Periodic curves are held unrolled, see `from_periodic`.
 """
@@ -11,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
+
 from patchwright.models import knots as knot_tools
 from patchwright.models.arrays import Array, frozen
 from patchwright.models.errors import ParameterError
@@ -183,7 +185,8 @@ class NurbsCurve:
         return self._of(knots, net, self.degree + times)
 
     def length(self, t0: float | None = None, t1: float | None = None, *, accuracy: float = 1e-12) -> float:
-        """Arc length between two parameters (None: the domain's end), to the relative accuracy; negative where t1 < t0."""
+        """Arc length between two parameters (None: the domain's end), to the relative accuracy; negative where t1 <
+        t0."""
         from patchwright.models.arc_length import ArcLength
 
         low, high = self.domain

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 import numpy.typing as npt
+
 from patchwright.models import knots as knot_tools
 from patchwright.models.arrays import Array, frozen
 from patchwright.models.errors import ParameterError
@@ -93,8 +94,8 @@ class NurbsSurface:
     ) -> NurbsSurface:
         """The clamped, unrolled form of a surface that is periodic in the directions marked.
 
-        `values` and `multiplicities` are distinct knots; in a periodic direction of one period, both ends included, as in
-        `knots.unrolled`.
+        `values` and `multiplicities` are distinct knots; in a periodic direction of one period, both ends included,
+        as in `knots.unrolled`.
 
         Raises
         ------
@@ -227,7 +228,8 @@ class NurbsSurface:
         return self.restricted(v=(low, t)), self.restricted(v=(t, high))
 
     def bezier_nets(self) -> tuple[Array, Array, Array]:
-        """Breaks in u (s + 1,), in v (r + 1,), and all Bezier nets (s, r, p + 1, q + 1, 3 or 4), homogeneous if rational."""
+        """Breaks in u (s + 1,), in v (r + 1,), and all Bezier nets (s, r, p + 1, q + 1, 3 or 4), homogeneous if
+        rational."""
         ts_u, rows = knot_tools.bezier_nets(self.degree[0], self.knots[0], self.homogeneous)
         ts_v, nets = knot_tools.bezier_nets(self.degree[1], self.knots[1], np.moveaxis(rows, 2, 0))
         return ts_u, ts_v, np.ascontiguousarray(np.transpose(nets, (2, 0, 3, 1, 4)))

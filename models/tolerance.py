@@ -23,12 +23,14 @@ class Tolerance:
     """Lengths in the model's unit, the angle in degrees.
 
     `gap` is the round-off below which two points are the same; `fit` is how far a fitted surface may stray; `angle`
-    separates smooth from sharp edges.
+    separates smooth from sharp edges. `given` says that somebody asked for this fit tolerance, so that it is not to be
+    widened to what the data can carry.
     """
 
     gap: float
     fit: float
     angle: float = SMOOTH_ANGLE
+    given: bool = False
 
     @classmethod
     def of(cls, thing: Assembly | Triangulation, *, fit: float | None = None, angle: float = SMOOTH_ANGLE) -> Tolerance:
@@ -43,4 +45,4 @@ class Tolerance:
         single_precision = 4.0 * float(np.finfo(np.float32).eps) * reach
         if fit is not None and not (np.isfinite(fit) and fit > 0.0):
             raise ParameterError(f"the fit tolerance must be a positive length, got {fit}")
-        return cls(max(ROUND_OFF_SHARE * diagonal, single_precision), FIT_SHARE * diagonal if fit is None else fit, angle)
+        return cls(max(ROUND_OFF_SHARE * diagonal, single_precision), FIT_SHARE * diagonal if fit is None else fit, angle, fit is not None)

@@ -27,6 +27,7 @@ from patchwright.models.errors import ParameterError
 from patchwright.models.triangulation import Triangulation
 
 T = TypeVar("T")
+N = TypeVar("N", bound=np.generic)
 
 BATCH = 4096  # fewer queries than this are not worth a thread
 
@@ -126,7 +127,7 @@ class Tree:
         """
         from patchwright.models._nearest_kernel import closest_points
 
-        query = _points(points, "points")
+        query = query_points(points, "points")
         if not len(self.triangulation):
             raise ParameterError(
                 f"the closest points of {len(query)} points were asked of a triangulation without triangles"
@@ -134,10 +135,10 @@ class Tree:
         found = ClosestPoints(
             np.empty((len(query), 3)), np.empty(len(query)), np.empty(len(query), np.int64), np.empty((len(query), 3))
         )
-        _in_shares(
+        in_shares(
             closest_points,
-            (*self._flat, query),
-            self._coherent(query),
+            (*self.flat, query),
+            self.coherent(query),
             (found.points, found.distance, found.triangle, found.barycentric),
         )
         return found
@@ -162,16 +163,15 @@ class Tree:
             raise ParameterError(f"the reach must be a number or one per ray ({len(start)},), got {limit.shape}")
         if np.isnan(limit).any():
             raise ParameterError(f"the reach of ray {int(np.isnan(limit).argmax())} is NaN")
-        still = ~ahead.any(axis=1)
+        still = (ahead[:, 0] == 0.0) & (ahead[:, 1] == 0.0) & (ahead[:, 2] == 0.0)
         if still.any():
             raise ParameterError(f"the direction of ray {int(still.argmax())} has length zero")
         found = RayHits(np.full(len(start), np.inf), np.full(len(start), -1, np.int64), np.zeros((len(start), 3)))
         if len(self.triangulation):
-            spread = np.ptp(start, axis=0).max(initial=0.0)
-            order = self._coherent(start if spread > 1e-3 * np.abs(self.boxes[0]).max() else ahead)  # one eye: by view
-            _in_shares(
+            order = self.coherent(start, ahead)
+            in_shares(
                 first_hits,
-                (*self._flat, start, ahead, np.ascontiguousarray(limit)),
+                (*self.flat, start, ahead, np.ascontiguousarray(limit)),
                 order,
                 (found.distance, found.triangle, found.barycentric),
             )
@@ -195,9 +195,8 @@ class Tree:
         first, last = _pair(start, end, "start", "end")
         if not len(self.triangulation):
             return SegmentHits(np.zeros(len(first) + 1, np.int64), np.zeros(0), np.zeros(0, np.int64), np.zeros((0, 3)))
-        shares = max(1, min(_threads(), len(first) // BATCH))
-        jobs = zip(np.array_split(first, shares), np.array_split(last, shares), strict=True)
-        found: list[tuple[IntArray, Array]] = _side_by_side([partial(all_hits, *self._flat, *job) for job in jobs])
+        jobs = zip(shares_of(first), shares_of(last), strict=True)
+        found: list[tuple[IntArray, Array]] = side_by_side([partial(all_hits, *self.flat, *job) for job in jobs])
         offsets = np.concatenate([[0], np.cumsum(np.concatenate([count for count, _ in found]))])
         rows = np.concatenate([hits for _, hits in found])
         return SegmentHits(offsets, rows[:, 0].copy(), rows[:, 1].astype(np.int64), rows[:, 2:].copy())
@@ -207,40 +206,51 @@ class Tree:
 
         Without `other`, the pairs within this tree, each once and lower number first.
         """
+        found = self.touching(other)
+        width = len(self.triangulation if other is None else other.triangulation)
+        return found[np.argsort(found[:, 0] * width + found[:, 1])]
+
+    def touching(self, other: Tree | None = None) -> IntArray:
+        """`pairs` in no particular order."""
         from patchwright.models._tree_kernel import exact_boxes, overlapping
 
-        with_ = self if other is None else other
-        if not len(self.triangulation) or not len(with_.triangulation):
+        second = self if other is None else other
+        if not len(self.triangulation) or not len(second.triangulation):
             return np.zeros((0, 2), dtype=np.int64)
         mine = exact_boxes(self.corners)
-        theirs = mine if other is None else exact_boxes(with_.corners)
+        theirs = mine if other is None else exact_boxes(second.corners)
         found: IntArray = overlapping(
             self.boxes, self.child, mine, self.index, self.center,
-            with_.boxes, with_.child, theirs, with_.index, with_.center, other is None,
+            second.boxes, second.child, theirs, second.index, second.center, other is None,
         )  # fmt: skip
-        return found[np.argsort(found[:, 0] * len(with_.triangulation) + found[:, 1])]
+        return found
 
     @property
-    def _flat(self) -> tuple[Any, ...]:
+    def flat(self) -> tuple[Any, ...]:
         return self.boxes, self.child, self.corners, self.index, self.center
 
-    def _coherent(self, points: Array) -> IntArray:
-        """The order in which to ask: near ones one after the other, where that saves more than it costs."""
+    def coherent(self, points: Array, directions: Array | None = None) -> IntArray:
+        """The order in which to ask: near ones one after the other, where that saves more than it costs.
+
+        Rays that all start near one point are ordered by their directions.
+        """
         from patchwright.models._tree_kernel import morton_order
 
         if len(points) < 256 or len(self.triangulation) < 256:
             return np.arange(len(points))
-        order: IntArray = morton_order(points)
+        least = 1e-3 * float(np.abs(self.boxes[0]).max())
+        order: IntArray = morton_order(points, points if directions is None else directions, least)
         return order
 
 
-def _threads() -> int:
+def shares_of(rows: npt.NDArray[N]) -> list[npt.NDArray[N]]:
+    """`rows` cut in one piece per thread, in a single piece if there are few."""
     from numba import get_num_threads
 
-    return int(get_num_threads())
+    return np.array_split(rows, max(1, min(int(get_num_threads()), len(rows) // BATCH)))
 
 
-def _side_by_side(jobs: list[Callable[[], T]]) -> list[T]:
+def side_by_side(jobs: list[Callable[[], T]]) -> list[T]:
     """Results of the jobs, which release the interpreter lock, each in its own thread."""
     if len(jobs) == 1:
         return [jobs[0]()]
@@ -250,13 +260,12 @@ def _side_by_side(jobs: list[Callable[[], T]]) -> list[T]:
         return [job.result() for job in [pool.submit(job) for job in jobs]]
 
 
-def _in_shares(kernel: Callable[..., None], before: tuple[Any, ...], order: IntArray, after: tuple[Any, ...]) -> None:
+def in_shares(kernel: Callable[..., None], before: tuple[Any, ...], order: IntArray, after: tuple[Any, ...]) -> None:
     """Call `kernel(*before, share, *after)` for shares of `order`; the shares write to different rows."""
-    shares = np.array_split(order, max(1, min(_threads(), len(order) // BATCH)))
-    _side_by_side([partial(kernel, *before, share, *after) for share in shares])
+    side_by_side([partial(kernel, *before, share, *after) for share in shares_of(order)])
 
 
-def _points(points: npt.ArrayLike, name: str) -> Array:
+def query_points(points: npt.ArrayLike, name: str) -> Array:
     """`points` as (n, 3) finite float64."""
     array = np.ascontiguousarray(points, dtype=np.float64)
     if array.ndim == 1 and array.shape == (3,):
@@ -273,7 +282,7 @@ def _points(points: npt.ArrayLike, name: str) -> Array:
 
 def _pair(first: npt.ArrayLike, second: npt.ArrayLike, name: str, other: str) -> tuple[Array, Array]:
     """Two (n, 3) arrays, one broadcast to the other if it has a single row."""
-    a, b = _points(first, name), _points(second, other)
+    a, b = query_points(first, name), query_points(second, other)
     if len(a) != len(b) and 1 not in (len(a), len(b)):
         raise ParameterError(f"{len(a)} {name} do not go with {len(b)} {other}")
     a, b = np.broadcast_arrays(a, b)

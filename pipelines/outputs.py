@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from patchwright.models.errors import ParameterError
 from patchwright.pipelines.progress import Report
@@ -46,7 +48,7 @@ def write_outputs(study: Study, names: tuple[str, ...], report: Report) -> tuple
         path = study.folder / name
         report(f"writing {name}", i / len(names))
         suffix = path.suffix.lower()
-        thing = None
+        thing: Any = None
         if repaired.verdict is not Verdict.REFUSED:
             if suffix in (".xyz", ".p3d", ".x"):
                 thing = repaired.grid
@@ -58,7 +60,8 @@ def write_outputs(study: Study, names: tuple[str, ...], report: Report) -> tuple
             path.unlink(missing_ok=True)
             continue
         if suffix in (".xyz", ".p3d", ".x"):
-            write(path, thing, iblank=True)
+            # Plot3D holds no names; the report lists the faces in the order of the blocks
+            write(path, replace(thing, names=()), iblank=True)
         else:
             write(path, thing)
         written.append(name)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -39,7 +40,7 @@ def draw(study: Study, report: Report) -> tuple[tuple[str, ...], tuple[str, ...]
 
 
 def _before(study: Study) -> Scene:
-    body = study.assembly.triangulation
+    body = _welded(study)
     scene = Scene(study.folder / "before.png", f"before: {Path(study.source).name}", body.bounds)
     scene.surface(body)
     if study.before is not None:
@@ -49,13 +50,21 @@ def _before(study: Study) -> Scene:
     return scene
 
 
+def _welded(study: Study) -> Triangulation:
+    """The input with its round-off welded: in a soup every edge is free, and a picture of them all shows nothing."""
+    from patchwright.repair.weld import weld, weld_distance
+
+    body = study.assembly.triangulation
+    return weld(body, weld_distance(body, study.tolerance)[0]).triangulation
+
+
 def _spots(study: Study) -> list[Scene]:
     """Close-ups of the gravest defects, one file each."""
     for old in study.folder.glob("defect-*.png"):
         old.unlink()
     if study.before is None:
         return []
-    body = study.assembly.triangulation
+    body = _welded(study)
     edges = free_edges(body)
     marked = [d for d in study.before.defects if d.severity in MARKED]
     spread: list[int] = []
@@ -98,7 +107,7 @@ def _after(study: Study, repaired: Repaired) -> list[Scene]:
     return scenes
 
 
-def _output_surface(repaired: Repaired) -> tuple[Triangulation, Array, Array]:
+def _output_surface(repaired: Repaired) -> tuple[Triangulation, Any, Array]:
     """Triangles of the output, their colours by rung, and the patch borders as segments."""
     if repaired.network is None:
         body = repaired.triangulation

@@ -85,7 +85,8 @@ def study_json(study: Study) -> dict[str, Any]:
         out["before"] = study.before.to_json()
     if study.repaired is not None:
         out.update(_repaired_json(study.repaired))
-    return _plain(out)
+    plain: dict[str, Any] = _plain(out)
+    return plain
 
 
 def _repaired_json(repaired: Repaired) -> dict[str, Any]:

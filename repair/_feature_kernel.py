@@ -47,7 +47,10 @@ def settle_needles(order, neighbours, longest, height, threshold, normals):
 
 @njit(cache=True, nogil=True)
 def filter_normals(triangles, offsets, fans, areas, noisy, width, rounds, normals):
-    """Average each noisy triangle's normal over its one-ring; normals that differ by more than `width` (chord) hardly count."""
+    """Average each noisy triangle's normal over its one-ring.
+
+    Normals that differ by more than `width` (a chord) hardly count.
+    """
     old = normals.copy()
     for _ in range(rounds):
         for i in range(len(triangles)):
@@ -167,7 +170,7 @@ def turning(points, starts, vertices, reach, turn):
         n = hi - lo
         for i in range(lo, hi + 1):
             turn[i] = 1.0
-            if (i == lo or i == hi) and not ring:
+            if i in (lo, hi) and not ring:
                 continue
             p = vertices[i]
             back, ahead = p, p

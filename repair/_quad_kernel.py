@@ -1,4 +1,4 @@
-"""Kernels of `pairing` and `quad_smooth`: pairs of triangles, their split into quads, and quads made square on the surface.
+"""Kernels of `pairing` and `quad_smooth`: pairs of triangles, their split into quads, and quads made square.
 
 Quads live in a `Mesh` too, of which only the vertex arrays are used.
 """
@@ -10,7 +10,6 @@ from numba import njit
 
 from patchwright.repair._remesh_kernel import (
     arc_at,
-    corner_of,
     on_curve,
     place_on_curve,
     place_on_ground,
@@ -124,7 +123,7 @@ def place_new(m, g, first, parents, regions, curves, arcs, normals):
 
 @inner
 def quad_quality(m, q, quads, outward):
-    """Scaled Jacobian of quad q: the least, over its corners, of the sine of the angle seen along the surface normal."""
+    """Scaled Jacobian of quad q: the least sine of its corners' angles, seen along the surface normal."""
     X, N = m.X, m.N
     a, b, c, d = quads[q, 0], quads[q, 1], quads[q, 2], quads[q, 3]
     ux, uy, uz = X[c, 0] - X[a, 0], X[c, 1] - X[a, 1], X[c, 2] - X[a, 2]
@@ -134,8 +133,10 @@ def quad_quality(m, q, quads, outward):
     if size == 0.0:
         return -1.0
     nx, ny, nz = nx / size, ny / size, nz / size
-    if nx * outward[q, 0] + ny * outward[q, 1] + nz * outward[q, 2] <= 0.0:
-        return -1.0
+    # a turned quad is judged along the surface normal at its centre, so that it can be seen to better
+    turned = nx * outward[q, 0] + ny * outward[q, 1] + nz * outward[q, 2] <= 0.0
+    if turned:
+        nx, ny, nz = outward[q, 0], outward[q, 1], outward[q, 2]
     worst = 1.0
     for k in range(4):
         p, after, before = quads[q, k], quads[q, (k + 1) % 4], quads[q, (k + 3) % 4]
@@ -149,7 +150,7 @@ def quad_quality(m, q, quads, outward):
             return -1.0
         j = (px * (uy * wz - uz * wy) + py * (uz * wx - ux * wz) + pz * (ux * wy - uy * wx)) / size
         worst = min(worst, j)
-    return worst
+    return min(worst, 0.0) if turned else worst
 
 
 @njit(cache=True, nogil=True)
@@ -175,7 +176,9 @@ def try_place(m, g, v, x, y, z):
 
 @njit(cache=True, nogil=True)
 def smooth_quads(m, g, quads, outward, offsets, around, near_offsets, near, low, high, goal, rounds):
-    """Even out the quads; a vertex moves only when the worst quad round it is not spoilt, poor quads are searched for better.
+    """Even out the quads; a vertex moves only when the worst quad round it is not spoilt.
+
+    Round poor quads better places are searched for.
 
     `low`, `high` (n,): the vertices before and after on the curve; `near`: edge neighbours.
     """
@@ -294,7 +297,7 @@ def smooth_paths(m, g, ends, regions, normals, share, points, triangles):
 
 @inner
 def curve_stretch(g, c, low, high, out, n):
-    """Append the polyline of curve c from arc length low to high to `out` (its length is counted when `out` is empty)."""
+    """Append the polyline of curve c from arc length low to high to `out`; an empty `out` only counts."""
     g_along = g.along
     x, y, z, first, _ = on_curve(g, c, low)
     ex, ey, ez, last, _ = on_curve(g, c, high)

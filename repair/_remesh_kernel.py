@@ -1,6 +1,7 @@
 """Kernels of `remesh`: collapse, split, flip and smooth triangles that lie on another triangulation.
 
-A vertex is smooth (kind 0, anywhere in its region), on a feature curve (kind 1, at an arc length) or fixed (kind 2, an anchor).
+A vertex is smooth (kind 0, anywhere in its region), on a feature curve (kind 1, at an arc length) or fixed (kind 2, an
+anchor).
 """
 
 from __future__ import annotations
@@ -330,14 +331,14 @@ def flip_pass(m, g, count):
             old, new = 1.0, 1.0
             for piece in range(4):
                 if piece == 0:
-                    i, j, l = a, b, c
+                    i, j, k3 = a, b, c
                 elif piece == 1:
-                    i, j, l = b, a, d
+                    i, j, k3 = b, a, d
                 elif piece == 2:
-                    i, j, l = a, d, c
+                    i, j, k3 = a, d, c
                 else:
-                    i, j, l = d, b, c
-                value = quality(m, g, i, j, l, region, True)
+                    i, j, k3 = d, b, c
+                value = quality(m, g, i, j, k3, region, True)
                 if piece < 2:
                     old = min(old, value)
                 else:
@@ -517,7 +518,7 @@ def place_on_ground(m, g, v, x, y, z, t):
 
 @inner
 def split_edge(m, g, t, k, vertices, triangles, starts):
-    """Put a vertex into side k of t (the new vertex is `vertices`, new triangles from `triangles` on); whether it could be."""
+    """Put vertex `vertices` into side k of t, with new triangles from `triangles` on; whether that could be done."""
     B, T, F, R, X, v2t = m.B, m.T, m.F, m.R, m.X, m.v2t
     o = B[t, k]
     a, b, c = T[t, k], T[t, (k + 1) % 3], T[t, (k + 2) % 3]
@@ -535,9 +536,9 @@ def split_edge(m, g, t, k, vertices, triangles, starts):
             n = starts_of(m, g, x, R[t], starts, n)
         nx, ny, nz = 0.0, 0.0, 0.0
         for tri in (t, o):
-            i, j, l = T[tri, 0], T[tri, 1], T[tri, 2]
+            i, j, k3 = T[tri, 0], T[tri, 1], T[tri, 2]
             ux, uy, uz = X[j, 0] - X[i, 0], X[j, 1] - X[i, 1], X[j, 2] - X[i, 2]
-            wx, wy, wz = X[l, 0] - X[i, 0], X[l, 1] - X[i, 1], X[l, 2] - X[i, 2]
+            wx, wy, wz = X[k3, 0] - X[i, 0], X[k3, 1] - X[i, 1], X[k3, 2] - X[i, 2]
             nx, ny, nz = nx + uy * wz - uz * wy, ny + uz * wx - ux * wz, nz + ux * wy - uy * wx
         x, y, z = 0.5 * (X[a, 0] + X[b, 0]), 0.5 * (X[a, 1] + X[b, 1]), 0.5 * (X[a, 2] + X[b, 2])
         x, y, z, at = put_on(x, y, z, nx, ny, nz, starts, n, g)
@@ -612,7 +613,7 @@ def split_pass(m, g, vertices, triangles, limit):
 
 @njit(cache=True, nogil=True)
 def smooth_pass(m, g, vertices, relax):
-    """Move smooth vertices to the mean of their triangles' centres and curve vertices to even spacing; how many moved."""
+    """Move smooth vertices to the mean of their triangles' centres, curve vertices to even spacing; how many."""
     kind, T, R, X, H, vt, vs, N = m.kind, m.T, m.R, m.X, m.H, m.vt, m.vs, m.N
     ring = np.empty(_RING, dtype=np.int64)
     starts = np.empty(64, dtype=np.int64)

@@ -8,7 +8,7 @@ from numba import njit
 
 @njit(cache=True, nogil=True)
 def grade(points, triangles, slope, size):
-    """Lower `size` (n,) until it differs by at most `slope` times the length along every edge; sweeps forth and back."""
+    """Lower `size` (n,) until it differs by at most `slope` times the length along every edge."""
     m = len(triangles)
     for sweep in range(400):
         changed = False

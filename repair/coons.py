@@ -79,7 +79,7 @@ def offset_normals(grid: Array) -> Array:
     mean = np.divide(mean, mean_length, out=np.zeros_like(mean), where=mean_length > 0)
     scale = np.linalg.norm(du, axis=-1, keepdims=True) * np.linalg.norm(dv, axis=-1, keepdims=True)
     sound = length > 1e-6 * scale
-    return np.where(sound, np.divide(normal, length, out=np.zeros_like(normal), where=length > 0), mean)
+    return np.asarray(np.where(sound, np.divide(normal, length, out=np.zeros_like(normal), where=length > 0), mean))
 
 
 def offset_distance(grid: Array) -> Array:

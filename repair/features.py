@@ -1,7 +1,7 @@
 """Sharp edges, boundaries and corners of a triangulation, chained into curves that part it into smooth regions.
 
-An edge is sharp where the triangles' normals, freed from noise and needles, turn by more than the angle; lines that fade
-below it are followed down to `HYSTERESIS` of it as long as they go straight on. Specks are dropped.
+An edge is sharp where the triangles' normals, freed from noise and needles, turn by more than the angle; lines that
+fade below it are followed down to `HYSTERESIS` of it as long as they go straight on. Specks are dropped.
 """
 
 from __future__ import annotations
@@ -38,7 +38,8 @@ class Features:
     offsets : (c + 1,) rows of the curve arrays that belong to each curve
     vertices : (k,) vertices along each curve, both ends included; a closed curve ends where it begins
     along : (k,) arc length from the curve's start
-    beside : (k, 2) triangles beside the segment that starts here (the second -1 at a boundary; last row as the one before)
+    beside : (k, 2) triangles beside the segment that starts here, the second -1 at a boundary; the last row is as the
+        one before
     kind : (c,) FOLLOWED, SHARP or BOUNDARY
     corners : (f,) vertices in which curves end
     noise : estimated scatter of the vertices off a smooth surface, a length
@@ -186,7 +187,8 @@ def _split_touching(triangulation: Triangulation, frozen: IntArray | None) -> tu
         bad = int(np.flatnonzero(adjacency.non_manifold)[0])
         where = triangulation.vertices[adjacency.edges[bad]].mean(axis=0).round(6).tolist()
         raise GeometryError(
-            f"a layout needs a 2-manifold, but {int(adjacency.non_manifold.sum())} edges have more than two triangles, one at {where}"
+            f"a layout needs a 2-manifold, but {int(adjacency.non_manifold.sum())} edges have more than two triangles, "
+            f"one at {where}"
         )
     if adjacency.inconsistent.any():
         raise GeometryError(
@@ -244,7 +246,7 @@ def _normals(body: Triangulation, neighbours: IntArray, edges: IntArray) -> tupl
 
 
 def _noise(body: Triangulation, edges: IntArray, normals: Array) -> float:
-    """Scatter of the vertices: the double umbrella operator of smooth surfaces is small, that of noise is 1.36 times it."""
+    """Scatter of the vertices: the double umbrella of a smooth surface is small, that of noise 1.36 times the noise."""
     n = len(body.vertices)
     flat = body.triangles.reshape(-1)
     mean = np.zeros((n, 3))
@@ -293,7 +295,7 @@ def _not_specks(edges: IntArray, feature: BoolArray, firm: BoolArray, length: Ar
         ends = np.ascontiguousarray(edges[picked])
         offsets, incident = _incident(ends, int(edges.max()) + 1)
         degree = np.diff(offsets)
-        starts, vertices, walked, chain = kernel.trace(ends, offsets, incident, degree != 2)
+        starts, vertices, _, chain = kernel.trace(ends, offsets, incident, degree != 2)
         pieces = np.diff(starts)
         size = np.bincount(chain, weights=length[picked], minlength=len(pieces))
         rows = starts[:-1] + np.arange(len(pieces))

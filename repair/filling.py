@@ -14,7 +14,7 @@ from enum import Enum
 
 import numpy as np
 
-from patchwright.models.arrays import Array, BoolArray
+from patchwright.models.arrays import Array, BoolArray, IntArray
 from patchwright.models.errors import ParameterError
 
 HARDY_EXPONENT = 0.001  # gamma of HJR 12
@@ -61,7 +61,7 @@ def fill(offsets: Array, found: BoolArray, *, method: str = "smooth", noise: flo
     return METHODS[method](offsets, found, noise), FillStatus.FILLED
 
 
-def _collinear(sites: Array) -> bool:
+def _collinear(sites: IntArray) -> bool:
     centred = sites - sites.mean(axis=0)
     return bool(np.linalg.matrix_rank(centred) < 2)
 
@@ -72,7 +72,7 @@ def _smooth(offsets: Array, found: BoolArray, noise: float) -> Array:
     from scipy.ndimage import binary_dilation
 
     m, n = offsets.shape
-    ring = found & binary_dilation(~found, structure=np.ones((3, 3)), iterations=RING)
+    ring = found & binary_dilation(~found, structure=np.ones((3, 3), dtype=bool), iterations=RING)
     if ring.sum() < ENOUGH or _collinear(np.argwhere(ring)):
         ring = found
     scale = np.array([max(m - 1, 1), max(n - 1, 1)], dtype=np.float64)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from patchwright.models.arrays import Array
+from patchwright.models.arrays import Array, IntArray
 from patchwright.models.errors import GeometryError, ParameterError
 from patchwright.models.nurbs_curve import NurbsCurve
 from patchwright.models.tolerance import Tolerance
@@ -107,7 +107,7 @@ def _sides(patch: Any, number: int, tolerance: Tolerance) -> tuple[Array, Array,
     return south, east, north, west
 
 
-def _merge(points: Array, distance: float) -> tuple[Array, Array]:
+def _merge(points: Array, distance: float) -> tuple[IntArray, Array]:
     """Numbers of the merged points and the points; clusters within `distance` are one, at their mean."""
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
@@ -118,7 +118,7 @@ def _merge(points: Array, distance: float) -> tuple[Array, Array]:
     count, label = connected_components(graph, directed=False)
     mean = np.zeros((count, 3))
     np.add.at(mean, label, points)
-    return label, mean / np.bincount(label, minlength=count)[:, None]
+    return label.astype(np.int64), mean / np.bincount(label, minlength=count)[:, None]
 
 
 def _find(edges: list[tuple[int, int]], paths: list[Array], ends: tuple[int, int], path: Array, distance: float) -> int:

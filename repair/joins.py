@@ -8,6 +8,8 @@ measured, never assumed.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from patchwright.models.arrays import Array, BoolArray, IntArray
@@ -56,11 +58,11 @@ def sector_normals(layout: QuadLayout, at_corners: Array) -> Array:
     quads, sides = np.nonzero(smooth[layout.quad_edges])
     edge = layout.quad_edges[quads, sides]
     order = np.argsort(edge, kind="stable")
-    quads, sides = quads[order].reshape(-1, 2), sides[order].reshape(-1, 2)  # the two uses of each smooth edge
+    quad, side = quads[order].reshape(-1, 2), sides[order].reshape(-1, 2)  # the two uses of each smooth edge
     # the uses run opposite ways: the start corner of one is the end corner of the other
-    start = quads * 4 + sides
-    end = quads * 4 + (sides + 1) % 4
-    turned = layout.edge_reversed[quads[:, 0], sides[:, 0]] == layout.edge_reversed[quads[:, 1], sides[:, 1]]
+    start = quad * 4 + side
+    end = quad * 4 + (side + 1) % 4
+    turned = layout.edge_reversed[quad[:, 0], side[:, 0]] == layout.edge_reversed[quad[:, 1], side[:, 1]]
     other_start = np.where(turned, start[:, 1], end[:, 1])
     other_end = np.where(turned, end[:, 1], start[:, 1])
     i = np.concatenate([start[:, 0], end[:, 0]])
@@ -143,7 +145,7 @@ def edge_fields(layout: QuadLayout, sides: Array, sectors: Array) -> Array:
 
 def _unit(vectors: Array) -> Array:
     length = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    return np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0)
+    return np.asarray(np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0))
 
 
 def follow_fields(layout: QuadLayout, nets: PatchNets, fields: Array) -> PatchNets:
@@ -155,59 +157,74 @@ def follow_fields(layout: QuadLayout, nets: PatchNets, fields: Array) -> PatchNe
     smooth = smooth_edges(layout)
     groups = []
     for (m, n), which, group in nets.groups():
-        groups.append((which, _follow(layout, which, group.copy(), (m, n), fields, smooth)))
+        groups.append((which, _follow(layout, which, group, (m, n), fields, smooth)))
     return PatchNets.pack(np.asarray(nets.cells), groups)
 
 
-def _follow(layout: QuadLayout, which: IntArray, nets: Array, cells: tuple[int, int], fields: Array, smooth: BoolArray) -> Array:
-    from scipy.interpolate import CubicSpline
+@dataclass(frozen=True, slots=True, eq=False)
+class _Side:
+    """One side of k patches: its conditions and the inner control points that may move.
 
+    `slots` (n,) numbers them on the ring; `basis` (n, n) their weights at the Greville points; `normal` and `leg`
+    (k, n, 3) the edge's normal and the cross-boundary difference there; `active` (k,) sides that are smooth.
+    """
+
+    slots: IntArray
+    basis: Array
+    normal: Array
+    leg: Array
+    active: BoolArray
+
+
+def _follow(layout: QuadLayout, which: IntArray, nets: Array, cells: tuple[int, int], fields: Array, smooth: BoolArray) -> Array:
+    """Moved copies of nets (k, M + 3, N + 3, 3) of one size."""
     m, n = cells
-    # the ring of inner control points, each with the direction it may move in
-    ring = [(i, j) for i in range(1, m + 2) for j in range(1, n + 2) if i in (1, m + 1) or j in (1, n + 1)]
-    slot = {ij: s for s, ij in enumerate(ring)}
-    direction = np.zeros((len(which), len(ring), 3))
-    rows, right = [], []
-    for k, along in ((0, 0), (1, 1), (2, 0), (3, 1)):
-        own = cells[along]
-        sites = greville(own)
-        field = fields[layout.quad_edges[which, k]]
+    ring = -np.ones((m + 3, n + 3), dtype=np.int64)  # numbers of the inner control points next to the boundary
+    ring[1 : m + 2, [1, n + 1]] = ring[[1, m + 1], 1 : n + 2] = 0
+    i, j = np.nonzero(ring == 0)
+    ring[i, j] = np.arange(len(i))
+    rows = (nets[:, :, 0], nets[:, -1], nets[:, :, -1], nets[:, 0])
+    inner = (nets[:, :, 1], nets[:, -2], nets[:, :, -2], nets[:, 1])
+    slots = (ring[1:-1, 1], ring[m + 1, 1:-1], ring[1:-1, n + 1], ring[1, 1:-1])
+    sides = []
+    for k in range(4):
+        edge = layout.quad_edges[which, k]
+        field = fields[edge]
         backward = layout.edge_reversed[which, k] != (k >= 2)
         field[backward] = field[backward][:, ::-1]
-        normal = CubicSpline(np.linspace(0.0, 1.0, field.shape[1]), field, axis=1)(sites)
-        normal = _unit(normal)
-        place = {0: lambda i: (i, 1), 1: lambda i: (m + 1, i), 2: lambda i: (i, n + 1), 3: lambda i: (1, i)}[k]
-        border = {0: nets[:, :, 0], 1: nets[:, -1], 2: nets[:, :, -1], 3: nets[:, 0]}[k]
-        inner = {0: nets[:, :, 1], 1: nets[:, -2], 2: nets[:, :, -2], 3: nets[:, 1]}[k]
-        # the shared boundary's own tangent stays perpendicular to the normal
-        tangent = _unit(np.einsum("ai,kid->kad", collocation(own, sites, 1), border))
-        normal = _unit(normal - (normal * tangent).sum(-1, keepdims=True) * tangent)
-        active = smooth[layout.quad_edges[which, k]]
-        basis = collocation(own, sites)[1:-1]
-        leg = np.einsum("ai,kid->kad", basis, inner - border)
-        scale = np.linalg.norm(leg, axis=-1)
-        scale[scale == 0.0] = 1.0
-        row = np.zeros((len(which), own + 1, len(ring)))
-        for i in range(1, own + 2):
-            s = slot[place(i)]
-            direction[:, s] += np.where(active[:, None], normal[:, i], 0.0)
-        rows.append((row, k, own, basis, normal[:, 1:-1], place, active, scale))
-        right.append(-np.einsum("kad,kad->ka", leg, normal[:, 1:-1]))
+        sides.append(_side(cells[k % 2], slots[k], rows[k], inner[k] - rows[k], field, smooth[edge]))
+    direction = np.zeros((len(which), len(i), 3))
+    for side in sides:
+        direction[:, side.slots] += np.where(side.active[:, None, None], side.normal, 0.0)
     direction = _unit(direction)
-    for (row, _, own, basis, normal, place, active, scale), value in zip(rows, right, strict=True):
-        for i in range(1, own + 2):
-            s = slot[place(i)]
-            row[:, :, s] = basis[:, i] * np.einsum("kad,kd->ka", normal, direction[:, s])
-        row /= scale[..., None]
-        value /= scale
-        row[~active], value[~active] = 0.0, 0.0
-    matrix = np.concatenate([r[0] for r in rows], axis=1)
-    value = np.concatenate(right, axis=1)
+    matrix, value, legs = [], [], []
+    for side in sides:
+        scale = np.linalg.norm(side.leg, axis=-1)
+        scale[scale == 0.0] = 1.0
+        turn = np.zeros((len(which), len(side.slots), len(i)))
+        turn[:, :, side.slots] = side.basis * np.einsum("kad,ksd->kas", side.normal, direction[:, side.slots])
+        weight = np.where(side.active[:, None], 1.0 / scale, 0.0)
+        matrix.append(turn * weight[..., None])
+        value.append(-np.einsum("kad,kad->ka", side.leg, side.normal) * weight)
+        legs.append(scale)
     # damped least squares in units of the patch's own legs: where two sides want contradicting twists, nobody gets far
-    leg = np.concatenate([r[7] for r in rows], axis=1).mean(axis=1)
-    matrix *= leg[:, None, None]
-    normal_matrix = np.einsum("kas,kat->kst", matrix, matrix) + DAMPING**2 * np.eye(len(ring))
-    move = np.linalg.solve(normal_matrix, np.einsum("kas,ka->ks", matrix, value)[..., None])[..., 0] * leg[:, None]
-    i, j = np.array(ring).T
-    nets[:, i, j] += move[..., None] * direction
-    return nets
+    leg = np.concatenate(legs, axis=1).mean(axis=1)[:, None, None]
+    equations, wanted = np.concatenate(matrix, axis=1) * leg, np.concatenate(value, axis=1)[..., None]
+    transposed = np.swapaxes(equations, 1, 2)
+    move = np.linalg.solve(transposed @ equations + DAMPING**2 * np.eye(len(i)), transposed @ wanted) * leg
+    moved = nets.copy()
+    moved[:, i, j] += move * direction
+    return moved
+
+
+def _side(own: int, slots: IntArray, border: Array, leg: Array, field: Array, active: BoolArray) -> _Side:
+    """The conditions along one side of `own` pieces, from its control row, the legs to the next row and the edge's field."""
+    from scipy.interpolate import CubicSpline
+
+    sites = greville(own)[1:-1]
+    basis = collocation(own, sites)
+    normal = _unit(CubicSpline(np.linspace(0.0, 1.0, field.shape[1]), field, axis=1)(sites))
+    # the shared boundary's own tangent stays perpendicular to the normal
+    tangent = _unit(np.einsum("ai,kid->kad", collocation(own, sites, 1), border))
+    normal = _unit(normal - (normal * tangent).sum(-1, keepdims=True) * tangent)
+    return _Side(slots, basis[:, 1:-1], normal, np.einsum("ai,kid->kad", basis, leg), active)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Literal
 
 from patchwright.models.assembly import Assembly
 from patchwright.models.errors import ParameterError
@@ -15,7 +15,7 @@ SCOPES = ("least", "all")
 OPENINGS = ("keep", "close")
 
 
-def repair(assembly: Assembly | Triangulation, *, scope: str = "least", layout: Any = "auto", openings: str = "keep",
+def repair(assembly: Assembly | Triangulation, *, scope: str = "least", layout: Any = "auto", openings: Literal["keep", "close"] = "keep",
            tolerance: Tolerance | float | None = None, domain: None = None, diagnosis: Diagnosis | None = None,
            progress: Progress | None = None) -> Repaired:
     """Mend a model with the least change.

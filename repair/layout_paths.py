@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from patchwright.models.arrays import Array, BoolArray, IntArray
-from patchwright.repair.features import BOUNDARY, SHARP, Features
+from patchwright.repair.features import SHARP, Features
 from patchwright.repair.pairing import QuadMesh
 
 PATH_POINTS = 9  # of a smooth edge
@@ -90,7 +90,7 @@ def trace_paths(quad_mesh: QuadMesh, features: Features) -> LayoutEdges:
         start > end,
         edge_quads,
         kind == SHARP,
-        kind == BOUNDARY,
+        edge_quads[:, 1] < 0,
         path_offsets,
         points,
         covered / total if total > 0 else 1.0,

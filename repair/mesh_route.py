@@ -8,15 +8,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 
 from patchwright.models.assembly import Assembly, Part
-from patchwright.models.arrays import Array
+from patchwright.models.arrays import Array, BoolArray
 from patchwright.models.tolerance import Tolerance
 from patchwright.models.tree import Tree
 from patchwright.models.triangulation import Triangulation
 from patchwright.repair.deviation import Deviation, two_sided
+from patchwright.repair.faceting import faceting
 from patchwright.repair.mend import BRIDGED, CUT, KEPT, Mended, mend
 from patchwright.repair.network import PatchNetwork
 from patchwright.repair.network_seams import measure
@@ -28,11 +30,12 @@ from patchwright.repair.resurface import resurface
 COVERAGE_GOAL = 0.99  # share of the area, both ways, within the fit tolerance
 RETRIES = 2
 FINER = 2.0  # quads of each retry against the one before
+WIDEST = 10.0  # times: how far a fit tolerance nobody asked for may widen to the height of coarse facets
 TESSELLATION = 12  # intervals per patch side when the patches are measured or written as triangles
 GRID = 8  # intervals per patch side of the structured grid
 
 
-def repair_mesh(assembly: Assembly, tolerance: Tolerance, *, scope: str, layout: str | QuadLayout, openings: str, clean: bool,
+def repair_mesh(assembly: Assembly, tolerance: Tolerance, *, scope: str, layout: str | QuadLayout, openings: Literal["keep", "close"], clean: bool,
                 progress: Progress) -> Repaired:
     """Mend a triangulated assembly and fit patches to it.
 
@@ -49,11 +52,12 @@ def repair_mesh(assembly: Assembly, tolerance: Tolerance, *, scope: str, layout:
     if mended.problems:
         problems = tuple(Problem(p.kind, _point(p.where), float(p.size), p.message) for p in mended.problems)
         return _refused(assembly, mended, ledger, problems)
+    tolerance, resolution = _resolved(tolerance, mended.triangulation)
     network, deviation, tries = _fit(mended, tolerance, layout, progress)
     seams = measure(network)
     faces = _faces(network, mended)
     invented = float(mended.triangulation.areas[mended.origin == BRIDGED].sum() / mended.triangulation.areas.sum())
-    ledger += (_fitting_entry(network, mended, tolerance, tries),)
+    ledger += (_fitting_entry(network, mended, tolerance, tries, resolution),)
     if scope == "all":
         tessellation = network.tessellate(TESSELLATION)
         tags = network.layout.tags[tessellation.tags] if tessellation.tags is not None else None
@@ -95,10 +99,11 @@ def _fit(mended: Mended, tolerance: Tolerance, layout: str | QuadLayout, progres
         if deviation.coverage >= COVERAGE_GOAL or not isinstance(layout, str):
             break
         wanted = int(FINER * len(quads.quads))
+    assert best is not None
     return *best, attempt + 1
 
 
-def network_invented(network: PatchNetwork, intervals: int) -> Array:
+def network_invented(network: PatchNetwork, intervals: int) -> BoolArray:
     """(triangles,) whether each triangle of `network.tessellate(intervals)` lies on invented surface."""
     cell = np.arange(intervals) * 8 // intervals
     mark = network.invented[:, cell][:, :, cell]
@@ -157,10 +162,25 @@ def _mending_ledger(assembly: Assembly, mended: Mended) -> tuple[LedgerEntry, ..
     return tuple(entries)
 
 
-def _fitting_entry(network: PatchNetwork, mended: Mended, tolerance: Tolerance, tries: int) -> LedgerEntry:
+def _resolved(tolerance: Tolerance, body: Triangulation) -> tuple[Tolerance, float]:
+    """The fit tolerance the data can carry, and the height of the data's facets.
+
+    A tolerance nobody asked for is widened to that height, up to `WIDEST` times: closer, a smooth patch would have to
+    copy the facets.
+    """
+    height = faceting(body, tolerance.angle)
+    if tolerance.given or height <= tolerance.fit:
+        return tolerance, height
+    return replace(tolerance, fit=min(height, WIDEST * tolerance.fit)), height
+
+
+def _fitting_entry(network: PatchNetwork, mended: Mended, tolerance: Tolerance, tries: int, resolution: float) -> LedgerEntry:
     worst = float(np.nanmax(network.deviation))
     over = int((network.deviation > tolerance.fit).sum())
-    reason = f"bicubic patches over {len(network)} quads, layout {tries}, {over} of them beyond the fit tolerance"
+    reason = (
+        f"bicubic patches over {len(network)} quads, layout {tries}; {over} stray farther than the fit tolerance somewhere; "
+        f"the input's facets are {resolution:.3g} high"
+    )
     return LedgerEntry("patches fitted", Rung.RESURFACE, mended.triangulation.tag_names, reason, count=len(network),
                        tolerance=tolerance.fit, largest_move=worst)
 

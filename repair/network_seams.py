@@ -29,11 +29,11 @@ def measure(network: PatchNetwork) -> tuple[Seam, ...]:
     n1, n2 = normals[pair[:, 0], pair[:, 1]], normals[pair[:, 2], pair[:, 3]]
     angle = np.degrees(2.0 * np.arcsin(np.clip(np.linalg.norm(n1 - n2, axis=2) / 2.0, 0.0, 1.0))).max(axis=1)
     seams = []
-    for edge, use in enumerate(uses):
-        kind = "free" if len(use) < 2 else ("sharp" if layout.sharp[edge] else "smooth")
-        x, y, z = middle[edge].tolist()
+    for number, use in enumerate(uses):
+        kind = "free" if len(use) < 2 else ("sharp" if layout.sharp[number] else "smooth")
+        x, y, z = middle[number].tolist()
         seams.append(
-            Seam(tuple(q for q, _ in use), float(gap[edge]), float(angle[edge]), kind, float(length[edge]), (x, y, z))
+            Seam(tuple(q for q, _ in use), float(gap[number]), float(angle[number]), kind, float(length[number]), (x, y, z))
         )
     return tuple(seams)
 

@@ -1,7 +1,7 @@
 """Triangles to quads only: good pairs are joined, then everything is split once at edge middles and centres.
 
-A joined pair becomes four quads, a triangle left alone three, so the result is pure quad whatever the pairs (the topology
-of Catmull-Clark's first step). Pairs are never joined across a feature.
+A joined pair becomes four quads, a triangle left alone three, so the result is pure quad whatever the pairs (the
+topology of Catmull-Clark's first step). Pairs are never joined across a feature.
 """
 
 from __future__ import annotations
@@ -29,7 +29,6 @@ class QuadMesh:
     outward : (m, 3) surface normals at the quads' centres
     sides : (k, 2) vertex pairs that lie on feature curves, along the curve
     side_curve : (k,) their curves
-    side_arcs : (k, 2) their arc lengths
     """
 
     ground: Any
@@ -42,7 +41,7 @@ class QuadMesh:
 
 
 def pair_score(coarse: CoarseMesh) -> Array:
-    """(m, 3) how near to a rectangle a triangle and its neighbour across side k would be, in [0, 1]; 0 when not allowed.
+    """(m, 3) how near to a rectangle a triangle and its neighbour across side k are, in [0, 1]; 0 when not allowed.
 
     1 - the largest difference of a corner from 90 degrees over 90, times the cosine between the triangles.
     """
@@ -85,7 +84,6 @@ def pair(coarse: CoarseMesh) -> QuadMesh:
     arcs = np.zeros((m, 3, 2))
     kernel.curve_sides_of_edges(mesh, ground, m, arcs)
     # faces: pairs as (a, d, b, c), triangles with -1 at the end
-    t = np.arange(m)
     alone = np.flatnonzero(partner < 0)
     joined = np.flatnonzero(partner >= 0)
     other = neighbours[joined, partner[joined]]
@@ -120,11 +118,12 @@ def pair(coarse: CoarseMesh) -> QuadMesh:
     parents[:e, :2] = ends
     parents[e:] = faces
     regions = np.concatenate([mesh.R[st], mesh.R[leader]])
-    grown = records.Mesh(
+    columns: Any = [
         *[np.concatenate([v, np.zeros((e + f, *v.shape[1:]), dtype=v.dtype)]) for v in mesh[:8]],
         *mesh[8:12],
         np.zeros(n + e + f, dtype=np.int64),
-    )
+    ]
+    grown = records.Mesh._make(columns)
     kernel.place_new(
         grown,
         ground,

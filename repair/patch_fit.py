@@ -68,11 +68,13 @@ def fit_group(rows: tuple[Array, Array, Array, Array], cells: tuple[int, int], t
     hits = project(coons[inner], normal[inner], distance[inner], target.tree)
     known = hits.hit & ~target.invented[hits.triangle]
     offset = np.zeros(coons.shape[:3])
-    found = ~inner  # the boundary curves are given, wherever they run
+    given: BoolArray = np.ones(coons.shape[:3], dtype=bool)
+    given[:, 1:-1, 1:-1] = False
+    found = given.copy()  # the boundary curves are given, wherever they run
     found[inner] = known
     offset[inner] = (1.0 - 2.0 * hits.t) * distance[inner]  # signed height of p above the Coons patch
     data = found.copy()
-    data[~inner] = ~target.invented[target.tree.closest(coons[~inner]).triangle]
+    data[given] = ~target.invented[target.tree.closest(coons[given]).triangle]
     # no data under the whole patch: its guide is the bridging surface itself
     bare = ~found[:, 1:-1, 1:-1].any(axis=(1, 2))
     guided = inner & bare[:, None, None]

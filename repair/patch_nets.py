@@ -84,4 +84,4 @@ def normals_of(du: Array, dv: Array) -> Array:
     """Unit normals of paired tangents (..., 3); zero where the tangents are parallel."""
     normal = np.cross(du, dv)
     length = np.linalg.norm(normal, axis=-1, keepdims=True)
-    return np.divide(normal, length, out=np.zeros_like(normal), where=length > 0)
+    return np.asarray(np.divide(normal, length, out=np.zeros_like(normal), where=length > 0))

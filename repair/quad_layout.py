@@ -1,7 +1,7 @@
 """`QuadLayout`: quads over a triangulation, each to become one patch, with the path every edge takes on the surface.
 
-`quad_layout` finds one: features and sizes of the triangulation, coarse triangles along the features, pairs of them made
-quads, all split once into quads only, then smoothed.
+`quad_layout` finds one: features and sizes of the triangulation, coarse triangles along the features, pairs of them
+made quads, all split once into quads only, then smoothed.
 """
 
 from __future__ import annotations
@@ -31,8 +31,9 @@ class LayoutReport:
     """How good a layout is.
 
     `folded` counts quads turned against the surface; the scaled Jacobian of a quad is the least sine of its corners'
-    angles, seen along the surface normal (1 is a rectangle, 0 a triangle, negative a fold); `feature_coverage` is the share
-    of the sharp and boundary length that quad edges follow; `euler` is that of the layout and of the triangulation.
+    angles, seen along the surface normal (1 is a rectangle, 0 a triangle, negative a fold); `feature_coverage` is the
+    share of the sharp and boundary length that quad edges follow; `euler` is that of the layout and that of the
+    triangulation.
     """
 
     irregular_vertices: int
@@ -59,8 +60,8 @@ class QuadLayout:
     sharp : (e,) bool, the two quads meet at a sharp feature
     boundary : (e,) bool, one quad only
     path_offsets : (e + 1,) int64, rows of `path_points` that belong to each edge
-    path_points : (k, 3) polylines on the triangulation from each edge's first to its second vertex; exactly the stretch of
-        the feature where the edge is sharp or boundary
+    path_points : (k, 3) polylines on the triangulation from each edge's first to its second vertex; exactly the stretch
+        of the feature where the edge is sharp or boundary
     triangle : (n,) int64, a triangle of the input each vertex lies on, -1 unknown
     tags : (m,) int64, the tag of the input most of each quad lies on
     report : how good the layout is, None when nobody measured
@@ -141,7 +142,7 @@ def quad_layout(
     if method == "quadriflow":
         from patchwright.repair.quadriflow import quadriflow
 
-        quad_mesh = quadriflow(features, target)
+        quad_mesh, features = quadriflow(features, target)
     else:
         quad_mesh = _pairs(features, target)
     return _finish(quad_mesh, features, begin)

@@ -14,6 +14,8 @@ from patchwright.models.arrays import Array, IntArray
 from patchwright.repair.pairing import QuadMesh
 
 ROUNDS = 4  # normals at the quads' centres are renewed between rounds
+EXTRA = 8  # further rounds while a quad is poorer than POOR
+POOR = 0.1
 PASSES = 6  # over all vertices in a round
 GOAL = 0.6  # scaled Jacobian that evening out may go down to
 
@@ -32,7 +34,9 @@ def smooth(quad_mesh: QuadMesh, *, rounds: int = ROUNDS) -> None:
     low, high = np.full(n, -1, dtype=np.int64), np.full(n, -1, dtype=np.int64)
     high[quad_mesh.sides[:, 0]] = quad_mesh.sides[:, 1]
     low[quad_mesh.sides[:, 1]] = quad_mesh.sides[:, 0]
-    for _ in range(rounds):
+    for turn in range(rounds + EXTRA if rounds else 0):
+        if turn >= rounds and scaled_jacobians(quad_mesh).min() > POOR:
+            break
         kernel.update_outward(mesh, ground, quads, quad_mesh.region, quad_mesh.outward)
         kernel.smooth_quads(
             mesh, ground, quads, quad_mesh.outward, offsets, around, near_offsets, near, low, high, GOAL, PASSES
@@ -41,7 +45,7 @@ def smooth(quad_mesh: QuadMesh, *, rounds: int = ROUNDS) -> None:
 
 
 def scaled_jacobians(quad_mesh: QuadMesh) -> Array:
-    """(m,) least sine of each quad's corner angles along the surface normal; -1 for a quad turned against the surface."""
+    """(m,) least sine of each quad's corner angles along the surface normal; -1 for a quad turned against it."""
     from patchwright.repair import _quad_kernel as kernel
 
     out = np.empty(len(quad_mesh.quads))

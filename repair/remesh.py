@@ -1,8 +1,8 @@
 """Coarse triangles on a triangulation: edges as long as a size field asks, along the features, topology kept.
 
 First short edges are collapsed onto one of their ends, the shortest first, so that all vertices stay vertices of the
-input; then rounds of splits, flips, collapses and smoothing (after Botsch and Kobbelt, SGP 2004, with lengths that vary)
-even out the rest. New and moved vertices are put back on the surface by walking over it, never across a feature.
+input; then rounds of splits, flips, collapses and smoothing (after Botsch and Kobbelt, SGP 2004, with lengths that
+vary) even out the rest. New and moved vertices are put back on the surface by walking over it, never across a feature.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ def remesh(features: Features, size: Array) -> CoarseMesh:
     """Triangles with edges about as long as `size` (n,), wanted lengths at the vertices of `features.body`."""
     from patchwright.repair import _remesh_kernel as kernel
 
-    ground = _ground(features, size)
+    ground = ground_of(features, size)
     mesh = _start(features, ground)
     count = len(mesh.T)
     length = np.linalg.norm(
@@ -79,7 +79,8 @@ def remesh(features: Features, size: Array) -> CoarseMesh:
     return CoarseMesh(ground, mesh)
 
 
-def _ground(features: Features, size: Array) -> Any:
+def ground_of(features: Features, size: Array) -> Any:
+    """The kernels' record of a triangulation with its curves and wanted lengths."""
     from patchwright.repair import _remesh_kernel as kernel
 
     body = features.body
@@ -167,7 +168,7 @@ def _compact(mesh: Any, vertices: int | None = None, triangles: int | None = Non
     out[7][: len(alive_v)] = new_t[out[7][: len(alive_v)]]
     out[8][: len(alive_t)] = new_v[out[8][: len(alive_t)]]
     out[9][: len(alive_t)] = new_t[out[9][: len(alive_t)]]
-    return kernel.Mesh(*out, np.zeros(len(alive_v) + room, dtype=np.int64))
+    return kernel.Mesh._make([*out, np.zeros(len(alive_v) + room, dtype=np.int64)])
 
 
 def _split(mesh: Any, ground: Any) -> Any:

@@ -126,8 +126,8 @@ def _curve_sizes(features: Features, quad_angle: float) -> tuple[IntArray, Array
     nearest = np.full(len(points), np.inf)
     tree = cKDTree(points)
     many = min(12, len(points))
-    gap, which = tree.query(points, k=many)
-    gap, which = gap.reshape(len(points), -1), which.reshape(len(points), -1)
+    found = tree.query(points, k=many)
+    gap, which = (np.asarray(x).reshape(len(points), -1) for x in found)
     foreign = owner[which] != owner[:, None]
     first = np.where(foreign.any(axis=1), foreign.argmax(axis=1), -1)
     rows = np.flatnonzero(first >= 0)

@@ -54,7 +54,7 @@ def interior_fit(cells: int, count: int) -> Array:
     The samples must already have the end control points' share subtracted.
     """
     inner = uniform_collocation(cells, count)[1:-1, 1:-1]
-    return np.linalg.pinv(inner)
+    return np.asarray(np.linalg.pinv(inner), dtype=np.float64)
 
 
 @lru_cache(maxsize=256)
@@ -63,7 +63,7 @@ def refinement(coarse: int, fine: int) -> Array:
     if fine % coarse:
         raise ValueError(f"{fine} cells do not refine {coarse}")
     sites = greville(fine)
-    matrix = np.linalg.solve(collocation(fine, sites), collocation(coarse, sites))
+    matrix = np.asarray(np.linalg.solve(collocation(fine, sites), collocation(coarse, sites)), dtype=np.float64)
     matrix[np.abs(matrix) < 1e-15] = 0.0
     matrix[0], matrix[-1] = 0.0, 0.0
     matrix[0, 0] = matrix[-1, -1] = 1.0

@@ -1,7 +1,7 @@
 """Circular arcs as exact rational quadratics, their knots at true angles.
 
-Reference: Piegl and Tiller, The NURBS Book, 2nd ed. 1997, section 7.3: an arc below 180 degrees has the weights 1, cos(half the angle), 1.
-Between knots the parameter is not the angle, at knots it is.
+Reference: Piegl and Tiller, The NURBS Book, 2nd ed. 1997, section 7.3: an arc below 180 degrees has the weights 1,
+cos(half the angle), 1. Between knots the parameter is not the angle, at knots it is.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ import math
 
 import numpy as np
 import numpy.typing as npt
+
 from patchwright.models.analytic.frame import TURN, Range, across, interval, point, positive, unit
 from patchwright.models.arrays import Array
 from patchwright.models.knots import ROUND_OFF
@@ -17,7 +18,8 @@ from patchwright.models.nurbs_curve import NurbsCurve
 
 
 def arc_net(angles: Range) -> tuple[Array, Array]:
-    """Knots of degree 2 and the homogeneous net (n, 3) of w cos, w sin, w of the unit arc; pieces of at most 90 degrees.
+    """Knots of degree 2 and the homogeneous net (n, 3) of w cos, w sin, w of the unit arc; pieces of at most 90
+    degrees.
 
     Quarter turns come out exactly, so that poles and seams of full turns coincide bit for bit.
     """

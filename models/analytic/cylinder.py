@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+
 from patchwright.models.analytic.arc import arc_net
 from patchwright.models.analytic.frame import (
     TURN,

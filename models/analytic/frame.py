@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import numpy.typing as npt
+
 from patchwright.models.arrays import Array, frozen
 from patchwright.models.errors import ParameterError
 from patchwright.models.knots import ROUND_OFF, inside

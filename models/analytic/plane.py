@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+
 from patchwright.models.analytic.frame import Range, across, bounded, interval, parameters, point, unit
 from patchwright.models.arrays import Array
 from patchwright.models.nurbs_surface import NurbsSurface

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+
 from patchwright.models.analytic.arc import arc_net
 from patchwright.models.analytic.frame import (
     TURN,
@@ -27,7 +28,8 @@ from patchwright.models.nurbs_surface import NurbsSurface
 class Torus:
     """S(u, v) = center + (major_radius + minor_radius cos v) (x cos u + y sin u) + minor_radius sin v z.
 
-    The normal S_u x S_v points out of the tube. A minor radius at or above the major one gives a torus that meets itself.
+    The normal S_u x S_v points out of the tube. A minor radius at or above the major one gives a torus that meets
+    itself.
 
     Parameters
     ----------

@@ -6,13 +6,14 @@ Lines, Bezier and B-spline curves are exact; arcs and every other kind become de
 
 from __future__ import annotations
 
+from math import pi
 from typing import Any
 
 import numpy as np
 
 from patchwright.models.arrays import Array
 from patchwright.models.cad import kernel
-from patchwright.models.cad.hermite import ARC_STEP, hermite_spline
+from patchwright.models.cad.hermite import ARC_STEP, circle_spline, hermite_spline
 from patchwright.models.cad.kernel_arrays import (
     curve_weights,
     items,
@@ -29,6 +30,8 @@ _LINES = (kernel.Geom_Line, kernel.Geom2d_Line)
 _TRIMMED = (kernel.Geom_TrimmedCurve, kernel.Geom2d_TrimmedCurve)
 _SPLINES = (kernel.Geom_BSplineCurve, kernel.Geom2d_BSplineCurve)
 _BEZIERS = (kernel.Geom_BezierCurve, kernel.Geom2d_BezierCurve)
+_CONICS = (kernel.Geom_Circle, kernel.Geom_Ellipse, kernel.Geom2d_Circle, kernel.Geom2d_Ellipse)
+_FIELDS = {"degree", "knots", "control_points", "weights", "homogeneous"}
 _MOST_SPANS = 256
 
 
@@ -38,11 +41,16 @@ def curve_from_kernel(curve: Any, t0: float, t1: float) -> NurbsCurve:
         curve = curve.BasisCurve()
     if isinstance(curve, _LINES):
         ends = _points([curve.Value(t0), curve.Value(t1)])
-        return NurbsCurve(1, np.array([t0, t0, t1, t1]), ends)
+        return plain_curve(1, np.array([t0, t0, t1, t1]), ends)
     if isinstance(curve, _BEZIERS):
         curve = _spline_of_bezier(curve)
     if isinstance(curve, _SPLINES):
         return _spline_from_kernel(curve, t0, t1)
+    if isinstance(curve, _CONICS):
+        knots, circle = circle_spline(t0, t1)
+        east, north, west = _points([curve.Value(t) for t in (0.0, pi / 2, pi)])
+        middle = (east + west) / 2.0
+        return plain_curve(7, knots, middle + circle @ np.stack([east - middle, north - middle]))
     return sampled_curve(curve, t0, t1)
 
 
@@ -56,9 +64,23 @@ def curve_to_kernel(curve: NurbsCurve) -> Any:
     return make(poles, kernel_reals(curve.weights), knots, multiplicities, curve.degree)
 
 
+def plain_curve(degree: int, knots: Array, points: Array) -> NurbsCurve:
+    """A curve without weights from fresh arrays that the kernel vouches for: its checks would take most of the reading."""
+    if set(NurbsCurve.__slots__) != _FIELDS:
+        return NurbsCurve(degree, knots, points)
+    knots.flags.writeable = points.flags.writeable = False
+    curve, put = object.__new__(NurbsCurve), object.__setattr__
+    put(curve, "degree", degree)
+    put(curve, "knots", knots)
+    put(curve, "control_points", points)
+    put(curve, "weights", None)
+    put(curve, "homogeneous", points)
+    return curve
+
+
 def point_curve(point: Array, t0: float, t1: float) -> NurbsCurve:
     """A curve that stays at one point (a pole) over [t0, t1]."""
-    return NurbsCurve(1, np.array([t0, t0, t1, t1]), np.stack([point, point]))
+    return plain_curve(1, np.array([t0, t0, t1, t1]), np.stack([point, point]))
 
 
 def _points(values: Any) -> Array:
@@ -86,14 +108,15 @@ def _spline_from_kernel(curve: Any, t0: float, t1: float) -> NurbsCurve:
         except kernel.Standard_Failure:
             return sampled_curve(curve, t0, t1)
     if curve.Degree() == 1 and curve.NbPoles() == 2 and not curve.IsRational():  # most pcurves
-        return NurbsCurve(1, np.array([t0, t0, t1, t1]), _points([curve.Pole(1), curve.Pole(2)]))
+        return plain_curve(1, np.array([t0, t0, t1, t1]), _points([curve.Pole(1), curve.Pole(2)]))
     knots, weights = reals(curve.KnotSequence()), curve_weights(curve)
     degree = curve.Degree()
     low, high = knots[degree], knots[-degree - 1]
     if (low, high) != (t0, t1):  # round-off of the ends only
         scaled = np.clip(t0 + (knots - low) * ((t1 - t0) / (high - low)), t0, t1)
         knots = np.where(knots <= low, t0, np.where(knots >= high, t1, scaled))
-    return NurbsCurve(degree, knots, _points(items(curve.Poles())), weights)
+    points = _points(items(curve.Poles()))
+    return plain_curve(degree, knots, points) if weights is None else NurbsCurve(degree, knots, points, weights)
 
 
 def sampled_curve(curve: Any, t0: float, t1: float) -> NurbsCurve:

@@ -16,6 +16,7 @@ import numpy as np
 from patchwright.models.analytic import Cone, Cylinder, Plane, Sphere, Torus
 from patchwright.models.arrays import Array
 from patchwright.models.cad import kernel
+from patchwright.models.cad.blocks import spline_surfaces
 from patchwright.models.cad.convert_curve import curve_from_kernel
 from patchwright.models.cad.hermite import circle_spline
 from patchwright.models.cad.kernel_arrays import (
@@ -23,9 +24,6 @@ from patchwright.models.cad.kernel_arrays import (
     kernel_net,
     kernel_reals,
     points_3d,
-    reals,
-    surface_weights,
-    table_items,
 )
 from patchwright.models.errors import UnsupportedEntity
 from patchwright.models.nurbs_surface import NurbsSurface
@@ -33,6 +31,20 @@ from patchwright.models.surface import Surface
 
 Bounds = tuple[float, float, float, float]
 _OFFSET_SHARE = 1e-9  # of its size: how far the NURBS of an offset surface may stray
+
+
+def surfaces_from_kernel(surfaces: list[Any], bounds: list[Bounds]) -> list[tuple[Surface, float]]:
+    """`surface_from_kernel` of many; plain B-spline surfaces, the most and the largest, in one go."""
+    plain: dict[int, Any] = {}
+    for i, surface in enumerate(surfaces):
+        if isinstance(surface, kernel.Geom_BSplineSurface) and not (surface.IsUPeriodic() or surface.IsVPeriodic()):
+            plain[i] = surface
+    # copies: a surface that two faces share would be written once
+    done = dict(zip(plain, spline_surfaces([s.Copy() for s in plain.values()]), strict=True)) if plain else {}
+    return [
+        (done[i], 1.0) if i in done else surface_from_kernel(surface, box)
+        for i, (surface, box) in enumerate(zip(surfaces, bounds, strict=True))
+    ]
 
 
 def surface_from_kernel(surface: Any, bounds: Bounds) -> tuple[Surface, float]:
@@ -178,10 +190,7 @@ def _nurbs_from_kernel(surface: Any, bounds: Bounds) -> NurbsSurface:
             surface.SetUNotPeriodic()
         if surface.IsVPeriodic():
             surface.SetVNotPeriodic()
-    net = points_3d(table_items(surface.Poles())).reshape(surface.NbUPoles(), surface.NbVPoles(), 3)
-    weights = surface_weights(surface)
-    degree = (surface.UDegree(), surface.VDegree())
-    return NurbsSurface(degree, (reals(surface.UKnotSequence()), reals(surface.VKnotSequence())), net, weights)
+    return spline_surfaces([surface])[0]
 
 
 def _revolved(points: Array, origin: Array, axis: Array, circle: Array) -> Array:

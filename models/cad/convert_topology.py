@@ -9,8 +9,8 @@ import numpy as np
 
 from patchwright.models.arrays import Array
 from patchwright.models.cad import kernel
-from patchwright.models.cad.convert_curve import curve_from_kernel, point_curve, sampled_curve
-from patchwright.models.cad.convert_surface import surface_from_kernel
+from patchwright.models.cad.convert_curve import curve_from_kernel, plain_curve, point_curve, sampled_curve
+from patchwright.models.cad.convert_surface import surfaces_from_kernel
 from patchwright.models.nurbs_curve import NurbsCurve
 from patchwright.models.surface import Surface
 from patchwright.models.topology import EdgeUse, Topology
@@ -56,9 +56,10 @@ def convert_faces(shape: Any, faces: list[Any]) -> ConvertedFaces:
         ranges.append(bounds)
         tolerances.append(kernel.BRep_Tool.Tolerance_s(edge))
     surfaces, scales, loops, flipped, lost = [], [], [], [], []
-    for face in faces:
-        forward = kernel.as_face(face.Oriented(kernel.FORWARD))
-        surface, scale = surface_from_kernel(kernel.BRep_Tool.Surface_s(forward), kernel.BRepTools.UVBounds_s(forward))
+    forwards = [kernel.as_face(face.Oriented(kernel.FORWARD)) for face in faces]
+    boxes = [kernel.BRepTools.UVBounds_s(face) for face in forwards]
+    converted = surfaces_from_kernel([kernel.BRep_Tool.Surface_s(face) for face in forwards], boxes)
+    for face, forward, (surface, scale) in zip(faces, forwards, converted, strict=True):
         found, reason = _face_loops(forward, edges, ranges, scale, surface)
         surfaces.append(surface)
         scales.append(scale)
@@ -73,8 +74,17 @@ def convert_faces(shape: Any, faces: list[Any]) -> ConvertedFaces:
 
 def trims_of(loops: tuple[tuple[EdgeUse, ...], ...]) -> tuple[tuple[NurbsCurve, ...], ...] | None:
     """The loops as chains of (u, v) curves, each running from its start to its end; None when there is no loop."""
-    chains = tuple(tuple(use.pcurve.reversed() if use.reversed else use.pcurve for use in loop) for loop in loops)
-    return chains or None
+    return (
+        tuple(tuple(_backwards(use.pcurve) if use.reversed else use.pcurve for use in loop) for loop in loops) or None
+    )
+
+
+def _backwards(curve: NurbsCurve) -> NurbsCurve:
+    if curve.weights is not None:
+        return curve.reversed()
+    t0, t1 = curve.domain
+    knots = np.clip(t0 + t1 - curve.knots[::-1], t0, t1)
+    return plain_curve(curve.degree, knots, np.ascontiguousarray(curve.control_points[::-1]))
 
 
 def _indexed(shape: Any, kind: Any) -> Any:
@@ -150,4 +160,6 @@ def _fitted(flat: NurbsCurve, bounds: tuple[float, float], scale: float, surface
         points = inside
     if knots is flat.knots and points is flat.control_points:
         return flat
+    if flat.weights is None:
+        return plain_curve(flat.degree, knots, points)
     return NurbsCurve(flat.degree, knots, points, flat.weights)

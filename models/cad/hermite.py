@@ -1,11 +1,13 @@
 """Degree-7 splines through values and three derivatives, for curves that are no splines in their own parameter.
 
 An arc whose parameter is the angle is not a NURBS; keeping the CAD kernel's parameter matters more here than keeping
-the circle exact, because the pcurves on both sides of an edge run with it. Two-point Hermite interpolation of degree 7 errs
-by at most |f^(8)| (h / 2)^8 / 8!, which is 2e-13 of the radius for h = pi / 16.
+the circle exact, because the pcurves on both sides of an edge run with it. Two-point Hermite interpolation of degree 7
+errs by at most |f^(8)| (h / 2)^8 / 8!, which is 2e-13 of the radius for h = pi / 16.
 """
 
 from __future__ import annotations
+
+from functools import lru_cache
 
 import numpy as np
 
@@ -37,8 +39,9 @@ def hermite_spline(breaks: Array, jets: Array) -> tuple[Array, Array]:
     return knots, points
 
 
+@lru_cache(maxsize=256)
 def circle_spline(t0: float, t1: float) -> tuple[Array, Array]:
-    """Knots and control points (n, 2) of (cos t, sin t) on [t0, t1], to 2e-13."""
+    """Knots and control points (n, 2) of (cos t, sin t) on [t0, t1], to 2e-13; not to be changed."""
     spans = max(1, int(np.ceil((t1 - t0) / ARC_STEP - 1e-9)))
     t = np.linspace(t0, t1, spans + 1)
     c, s = np.cos(t), np.sin(t)

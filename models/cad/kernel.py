@@ -28,8 +28,10 @@ from OCP.Geom import (
     Geom_BezierSurface,
     Geom_BSplineCurve,
     Geom_BSplineSurface,
+    Geom_Circle,
     Geom_ConicalSurface,
     Geom_CylindricalSurface,
+    Geom_Ellipse,
     Geom_Line,
     Geom_Plane,
     Geom_RectangularTrimmedSurface,
@@ -39,7 +41,14 @@ from OCP.Geom import (
     Geom_ToroidalSurface,
     Geom_TrimmedCurve,
 )
-from OCP.Geom2d import Geom2d_BezierCurve, Geom2d_BSplineCurve, Geom2d_Line, Geom2d_TrimmedCurve
+from OCP.Geom2d import (
+    Geom2d_BezierCurve,
+    Geom2d_BSplineCurve,
+    Geom2d_Circle,
+    Geom2d_Ellipse,
+    Geom2d_Line,
+    Geom2d_TrimmedCurve,
+)
 from OCP.GeomAbs import GeomAbs_Shape
 from OCP.GeomConvert import GeomConvert, GeomConvert_ApproxSurface
 from OCP.gp import gp_Ax3, gp_Dir, gp_Pnt, gp_Pnt2d
@@ -109,6 +118,8 @@ __all__ = [
     "FORWARD",
     "Geom2d_BSplineCurve",
     "Geom2d_BezierCurve",
+    "Geom2d_Circle",
+    "Geom2d_Ellipse",
     "Geom2d_Line",
     "Geom2d_TrimmedCurve",
     "GeomAbs_Shape",
@@ -120,6 +131,8 @@ __all__ = [
     "Geom_BezierSurface",
     "Geom_ConicalSurface",
     "Geom_CylindricalSurface",
+    "Geom_Circle",
+    "Geom_Ellipse",
     "Geom_Line",
     "Geom_Plane",
     "Geom_RectangularTrimmedSurface",

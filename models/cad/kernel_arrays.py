@@ -28,12 +28,6 @@ def items(line: Any) -> list[Any]:
     return [value(i) for i in range(line.Lower(), line.Upper() + 1)]
 
 
-def table_items(table: Any) -> list[Any]:
-    """The items of a kernel table, row by row."""
-    value, columns = table.Value, range(table.LowerCol(), table.UpperCol() + 1)
-    return [value(i, j) for i in range(table.LowerRow(), table.UpperRow() + 1) for j in columns]
-
-
 def reals(line: Any) -> Array:
     """(n,) numbers of a kernel array."""
     return np.array(items(line), dtype=np.float64)
@@ -49,15 +43,6 @@ def curve_weights(curve: Any) -> Array | None:
     out = kernel.Array1_double(1, curve.NbPoles())
     curve.Weights(out)
     return reals(out)
-
-
-def surface_weights(surface: Any) -> Array | None:
-    """(n, m) weights of a spline surface, None when it is not rational."""
-    if not (surface.IsURational() or surface.IsVRational()):
-        return None
-    out = kernel.Array2_double(1, surface.NbUPoles(), 1, surface.NbVPoles())
-    surface.Weights(out)
-    return np.array(table_items(out), dtype=np.float64).reshape(surface.NbUPoles(), surface.NbVPoles())
 
 
 def kernel_points(points: Array) -> Any:

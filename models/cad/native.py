@@ -1,4 +1,4 @@
-"""Opaque handles of the CAD kernel's shapes: bytes until somebody needs the shape, so that assemblies can be pickled."""
+"""Opaque handles of the CAD kernel's shapes: bytes until a shape is needed, so that assemblies can be pickled."""
 
 from __future__ import annotations
 

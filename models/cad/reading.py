@@ -10,10 +10,11 @@ import numpy as np
 
 from patchwright.models.assembly import Assembly, Part
 from patchwright.models.cad import kernel
+from patchwright.models.cad.blocks import RawMesh
 from patchwright.models.cad.convert_topology import convert_faces, trims_of
 from patchwright.models.cad.names import face_index, names_of
 from patchwright.models.cad.native import NativeFace, encode, faces_of
-from patchwright.models.cad.tessellate import ANGLE, RawMesh, tessellate
+from patchwright.models.cad.tessellate import ANGLE, tessellate
 from patchwright.models.errors import CorruptFile, RepairWarning, UnsupportedEntity
 from patchwright.models.surface import Surface
 from patchwright.models.triangulation import Triangulation

@@ -1,4 +1,4 @@
-"""Seams measured surface to surface: what an edge's pcurves give on the two true surfaces, not what a tolerance claims."""
+"""Seams measured surface to surface: by an edge's pcurves on the two true surfaces, not by what a tolerance claims."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ class Seam:
     `gap` is the largest distance between the two surfaces at equal parameters of the edge; `across` is its part across
     the edge, which leaves out pcurves that only run at different speeds (to first order in the slip); `angle` the
     largest angle in degrees between their outward normals (0 smooth, 180 a fold), `length` that of the edge,
-    `tolerance` the kernel's own (NaN when the edge never saw the kernel), `at` the point half-way. `beyond` is how far, in shares of the surface's
-    parameter range, a pcurve leaves it; the surface is then taken at its border.
+    `tolerance` the kernel's own (NaN when the edge never saw the kernel), `at` the point half-way. `beyond` is how far,
+    in shares of the surface's parameter range, a pcurve leaves it; the surface is then taken at its border.
     """
 
     edge: int

@@ -1,19 +1,14 @@
-"""Triangulations of a shape's faces with their (u, v), conforming along shared edges.
-
-The triangulations come out of the kernel in one binary block instead of point by point; its layout is that of the
-kernel's BinTools format, version 4 (BinTools_ShapeSet::WriteTriangulation of OpenCASCADE).
-"""
+"""Triangulations of a shape's faces with their (u, v), conforming along shared edges."""
 
 from __future__ import annotations
 
-from io import BytesIO
 from typing import Any
 
 import numpy as np
 
-from patchwright.models.arrays import Array, IntArray
+from patchwright.models.arrays import Array
 from patchwright.models.cad import kernel
-from patchwright.models.errors import EngineError
+from patchwright.models.cad.blocks import RawMesh, triangulations
 
 DEFLECTION_SHARE = 2e-4  # of the box's diagonal: default distance between a face and its triangles
 ANGLE = 0.25  # radians: default angle between neighbouring facets
@@ -35,16 +30,11 @@ def tessellate(shape: Any, faces: list[Any], deflection: float | None, angle: fl
     return raw_meshes(faces)
 
 
-RawMesh = tuple[Array, Array, IntArray]
-"""Nodes (n, 3), their (u, v) (n, 2) and triangles (m, 3) wound along the surface's own normal."""
-
-
 def raw_meshes(faces: list[Any]) -> list[RawMesh | None]:
     """The triangulations the faces carry, None where there is none."""
-    builder, block = kernel.BRep_Builder(), kernel.TopoDS_Compound()
-    builder.MakeCompound(block)
     location = kernel.TopLoc_Location()
-    meshed = kernel.IndexedMap_TopoDS_Shape_TopTools_ShapeMapHasher()  # copies of one face share one mesh
+    known = kernel.IndexedMap_TopoDS_Shape_TopTools_ShapeMapHasher()  # copies of one face share one mesh
+    meshes: list[Any] = []
     owner: list[int | None] = []
     transforms: list[Array | None] = []
     for face in faces:
@@ -53,16 +43,10 @@ def raw_meshes(faces: list[Any]) -> list[RawMesh | None]:
         if found is None or found.NbTriangles() == 0 or not found.HasUVNodes():
             owner.append(None)
             continue
-        known = meshed.Size()
-        owner.append(meshed.Add(face.Located(kernel.TopLoc_Location())) - 1)
-        if meshed.Size() == known:
-            continue
-        bare = kernel.TopoDS_Face()
-        builder.MakeFace(bare, found)
-        builder.Add(block, bare)
-    stream = BytesIO()
-    kernel.BinTools.Write_s(block, stream)
-    blocks = _parse(stream.getvalue())
+        owner.append(known.Add(face.Located(kernel.TopLoc_Location())) - 1)
+        if known.Size() > len(meshes):
+            meshes.append(found)
+    blocks = triangulations(meshes)
     out: list[RawMesh | None] = []
     for key, transform in zip(owner, transforms, strict=True):
         if key is None:
@@ -94,24 +78,3 @@ def edge_diagonal(shape: Any) -> float:
 
 def _matrix(transform: Any) -> Array:
     return np.array([[transform.Value(i, j) for j in range(1, 5)] for i in range(1, 4)])
-
-
-def _parse(data: bytes) -> list[RawMesh]:
-    marker = data.find(b"\nTriangulations ")
-    start = data.find(b"\n", marker + 1) + 1
-    if marker < 0 or not data.lstrip().startswith(b"Open CASCADE Topology V4"):
-        raise EngineError("the CAD kernel wrote its triangulations in a layout that is not known")
-    count, at = int(data[marker + len(b"\nTriangulations ") : start]), start
-    out: list[RawMesh] = []
-    for _ in range(count):
-        n, m = (int(k) for k in np.frombuffer(data, "<i4", 2, at))
-        normals = data[at + 9]
-        at += 10 + 8  # counts, has-uv, has-normals, deflection
-        nodes = np.frombuffer(data, "<f8", 3 * n, at).reshape(n, 3)
-        at += 24 * n
-        uv = np.frombuffer(data, "<f8", 2 * n, at).reshape(n, 2)
-        at += 16 * n
-        triangles = np.frombuffer(data, "<i4", 3 * m, at).reshape(m, 3).astype(np.int64) - 1
-        at += 12 * m + (12 * n if normals else 0)
-        out.append((nodes, uv, triangles))
-    return out

@@ -54,4 +54,4 @@ def _flux(surface: Any, middle: Any) -> float:
     u, v = (u0 + u1 + (u1 - u0) * nodes) / 2, (v0 + v1 + (v1 - v0) * nodes) / 2
     normal = np.cross(surface.grid(u, v, (1, 0)), surface.grid(u, v, (0, 1)))
     flux = np.einsum("ijk,ijk,i,j->", surface.grid(u, v) - middle, normal, weights, weights)
-    return float(flux) * (u1 - u0) * (v1 - v0) / 12.0
+    return float(flux * (u1 - u0) * (v1 - v0)) / 12.0

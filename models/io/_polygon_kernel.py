@@ -147,4 +147,4 @@ def triangulate(points: Array, corners: IntArray, offsets: IntArray, triangles: 
         a = start
         b = after[a]
         n = _put(triangles, owners, n, f, corners, first, a, b, after[b])
-    return n
+    return int(n)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
+
 from patchwright.models import knots as knot_tools
 from patchwright.models.arrays import Array, IntArray
 from patchwright.models.nurbs_surface import NurbsSurface

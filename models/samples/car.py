@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+
 from patchwright.models.arrays import Array
 from patchwright.models.nurbs_surface import NurbsSurface
 from patchwright.models.samples.body import Body

@@ -8,6 +8,7 @@ on the sphere: the construction of Cobb, Tiling the sphere with rational Bezier 
 from __future__ import annotations
 
 import numpy as np
+
 from patchwright.models import knots as knot_tools
 from patchwright.models.arrays import Array
 from patchwright.models.errors import ParameterError

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+
 from patchwright.models.arrays import Array, BoolArray, IntArray
 from patchwright.models.errors import ParameterError
 from patchwright.models.samples.defects import Damaged, Injected, removed

@@ -12,6 +12,7 @@ from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
+
 from patchwright.models.arrays import Array, IntArray, frozen
 from patchwright.models.assembly import Assembly, Part
 from patchwright.models.triangulation import Triangulation

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
+
 from patchwright.models.assembly import Assembly
 from patchwright.models.samples.aircraft import aircraft
 from patchwright.models.samples.cutting import slit

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+
 from patchwright.models.samples.cutting import push_apart
 from patchwright.models.samples.simple import CUBE_FACES, sphere, two_spheres
 from patchwright.models.samples.soup import duplicated, flipped

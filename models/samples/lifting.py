@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+
 from patchwright.models.arrays import Array
 from patchwright.models.nurbs_surface import NurbsSurface
 from patchwright.models.samples.body import Body

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+
 from patchwright.models.arrays import Array
 from patchwright.models.errors import ParameterError
 from patchwright.models.nurbs_surface import NurbsSurface

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+
 from patchwright.models.arrays import Array
 from patchwright.models.assembly import Assembly, Part
 from patchwright.models.nurbs_surface import NurbsSurface

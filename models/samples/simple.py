@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+
 from patchwright.models import knots as knot_tools
 from patchwright.models.arrays import Array
 from patchwright.models.nurbs_surface import NurbsSurface

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+
 from patchwright.models.errors import ParameterError
 from patchwright.models.samples.defects import Damaged, Injected, drawn, groups, removed
 from patchwright.models.triangulation import Triangulation, concatenate

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+
 from patchwright.models import knots as knot_tools
 from patchwright.models.arrays import Array
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+
 from patchwright.models.arrays import Array, IntArray
 from patchwright.models.errors import ParameterError
 from patchwright.models.samples.defects import Damaged, Injected, drawn
@@ -68,8 +69,7 @@ def degenerate(triangulation: Triangulation, share: float = 0.01, *, seed: int =
 def _sliver(triangulation: Triangulation, share: float, aspect: float, kind: str, seed: int) -> Damaged:
     chosen = drawn(triangulation, share, seed)
     a, b, c = np.moveaxis(triangulation.corners[chosen], 1, 0)
-    longest = np.maximum(np.linalg.norm(c - a, axis=1), np.linalg.norm(c - b, axis=1))
-    t = np.minimum(0.5, longest / (aspect * np.linalg.norm(b - a, axis=1)))
+    t = np.minimum(0.5, np.linalg.norm(c - a, axis=1) / (aspect * np.linalg.norm(b - a, axis=1)))
     out, origin, added = _split(triangulation, chosen, a + t[:, None] * (b - a), t)
     corners, areas = out.corners, out.areas
     labels = [Injected.of(kind, corners[t[0]], area=areas[t[0]], triangles=t[:1]) for t in added]

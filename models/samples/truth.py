@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+
 from patchwright.models.arrays import Array, BoolArray, IntArray
 from patchwright.models.errors import GeometryError, ParameterError
 from patchwright.models.nurbs_surface import NurbsSurface

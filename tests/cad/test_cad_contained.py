@@ -19,7 +19,7 @@ def test_values_errors_and_warnings_come_through() -> None:
     assert call(math.hypot, 3.0, 4.0, time_limit=30, what="adding") == 5.0
     with pytest.raises(FileNotFoundError):
         call(os.stat, "/nowhere/at/all", time_limit=30, what="looking")
-    with pytest.raises(EngineError, match="ValueError: .* while|while rooting: ValueError"):
+    with pytest.raises(EngineError, match="while rooting: ValueError"):
         call(math.sqrt, -1.0, time_limit=30, what="rooting")
     with pytest.warns(UserWarning, match="mind the gap"):
         call(warnings.warn, "mind the gap", time_limit=30, what="warning")
@@ -28,7 +28,7 @@ def test_values_errors_and_warnings_come_through() -> None:
 
 
 def test_crash_is_an_error_and_the_next_call_works() -> None:
-    with pytest.raises(EngineError, match="crashed .* while falling"):
+    with pytest.raises(EngineError, match=r"crashed .* while falling"):
         call(os.abort, time_limit=30, what="falling")
     assert call(abs, -2, time_limit=30, what="standing") == 2
 

@@ -2,11 +2,12 @@ import math
 
 import numpy as np
 import pytest
+
 from patchwright.models import Cone, Cylinder, ParameterError, Plane, Sphere, Surface, Torus
 from patchwright.models.differential import curvature, normals
 
 RNG = np.random.default_rng(11)
-O, A, X = RNG.normal(size=(3, 3))
+C, A, X = RNG.normal(size=(3, 3))
 A = A / np.linalg.norm(A)
 TURN = 2 * math.pi
 
@@ -28,15 +29,15 @@ def implicit(s, p):
 
 
 SURFACES = [
-    Plane(O, A, X, (0, 2), (-1, 1)),
-    Cylinder(O, A, 2.0, X, None, (-1, 3)),
-    Cylinder(O, A, 2.0, X, (0.3, 1.1), (-1, 3)),
-    Cone(O, A, 0.4, 1.0, X, None, (-5, 3)),
-    Cone(O, A, -0.4, 1.0, X, (-1, 4.0), (-5, 3)),
-    Sphere(O, 2.0, A, X),
-    Sphere(O, 2.0, A, X, (1, 2), (-0.3, 0.9)),
-    Torus(O, A, 3.0, 1.0, X),
-    Torus(O, A, 3.0, 1.0, X, (0.5, 0.5 + TURN), (-2, 1)),
+    Plane(C, A, X, (0, 2), (-1, 1)),
+    Cylinder(C, A, 2.0, X, None, (-1, 3)),
+    Cylinder(C, A, 2.0, X, (0.3, 1.1), (-1, 3)),
+    Cone(C, A, 0.4, 1.0, X, None, (-5, 3)),
+    Cone(C, A, -0.4, 1.0, X, (-1, 4.0), (-5, 3)),
+    Sphere(C, 2.0, A, X),
+    Sphere(C, 2.0, A, X, (1, 2), (-0.3, 0.9)),
+    Torus(C, A, 3.0, 1.0, X),
+    Torus(C, A, 3.0, 1.0, X, (0.5, 0.5 + TURN), (-2, 1)),
 ]
 
 
@@ -66,14 +67,14 @@ def test_derivatives_are_those_of_the_points(s):
 
 
 def test_normals_point_outwards():
-    for s in (Cylinder(O, A, 2.0, None, None, (0, 1)), Torus(O, A, 3, 1), Sphere(O, 2)):
+    for s in (Cylinder(C, A, 2.0, None, None, (0, 1)), Torus(C, A, 3, 1), Sphere(C, 2)):
         p, n = s(0.3, 0.4), normals(s, 0.3, 0.4)
         assert implicit(s, (p + 1e-3 * n)[None])[0] == pytest.approx(1e-3)
-    np.testing.assert_allclose(normals(Plane(O, A), 5.0, -7.0), A, atol=1e-15)
+    np.testing.assert_allclose(normals(Plane(C, A), 5.0, -7.0), A, atol=1e-15)
 
 
 def test_curvatures_are_the_known_ones():
-    t = Torus(O, A, 3.0, 1.0)
+    t = Torus(C, A, 3.0, 1.0)
     u, v = np.linspace(0, TURN, 7)[:, None], np.linspace(0, TURN, 9)
     for s in (t, t.to_nurbs()):
         vs = v if s is t else t.to_nurbs().breaks[1]
@@ -82,15 +83,15 @@ def test_curvatures_are_the_known_ones():
         np.testing.assert_allclose(
             k.mean, np.broadcast_to(-0.5 - 0.5 * np.cos(vs) / (3 + np.cos(vs)), k.mean.shape), atol=1e-12
         )
-    c = curvature(Cylinder(O, A, 2.0, None, None, (0, 1)), 1.0, 0.5)
+    c = curvature(Cylinder(C, A, 2.0, None, None, (0, 1)), 1.0, 0.5)
     assert c.maximum == pytest.approx(0, abs=1e-15)
     assert c.minimum == pytest.approx(-0.5)
     assert abs(c.maximum_direction @ A) == pytest.approx(1)
-    s = Sphere(O, 4.0).to_nurbs()
+    s = Sphere(C, 4.0).to_nurbs()
     k = curvature(s, [0.0, 1.0, 2.0], [0.0, np.pi / 2, -np.pi / 2])
     np.testing.assert_allclose(k.gauss, 1 / 16, rtol=1e-5)
     np.testing.assert_allclose(k.mean, -1 / 4, rtol=1e-5)
-    p = curvature(Plane(O, A), 0.0, 1.0)
+    p = curvature(Plane(C, A), 0.0, 1.0)
     assert p.maximum == p.minimum == 0
 
 
@@ -114,29 +115,29 @@ def test_poles_and_seams_are_exact():
 
 def test_scale():
     for scale in (1e-3, 1e3):
-        p = Torus(scale * O, A, 3 * scale, scale, X).to_nurbs()(*RNG.random((2, 50)))
-        assert np.abs(implicit(Torus(O, A, 3.0, 1.0), p / scale)).max() < 2e-14
+        p = Torus(scale * C, A, 3 * scale, scale, X).to_nurbs()(*RNG.random((2, 50)))
+        assert np.abs(implicit(Torus(C, A, 3.0, 1.0), p / scale)).max() < 2e-14
 
 
 @pytest.mark.parametrize(
     "bad",
     [
-        lambda: Plane(O, (0, 0, 0)),
-        lambda: Plane(O, A, A),
+        lambda: Plane(C, (0, 0, 0)),
+        lambda: Plane(C, A, A),
         lambda: Plane((0, 0, np.nan), A),
-        lambda: Cylinder(O, A, 0.0),
-        lambda: Cylinder(O, A, 1.0, u=(0, 7)),
-        lambda: Cylinder(O, A, 1.0, v=(1, 1)),
-        lambda: Cone(O, A, 0.0),
-        lambda: Cone(O, A, 1.6),
-        lambda: Cone(O, A, 0.3, -1.0),
-        lambda: Sphere(O, np.inf),
-        lambda: Sphere(O, 1.0, v=(0, 2)),
-        lambda: Torus(O, A, 1.0, -1.0),
-        lambda: Plane(O, A).to_nurbs(),
-        lambda: Cylinder(O, A, 1.0).to_nurbs(),
-        lambda: Sphere(O, 1.0)(7.0, 0.0),
-        lambda: Sphere(O, 1.0)(0.0, 0.0, (0, -1)),
+        lambda: Cylinder(C, A, 0.0),
+        lambda: Cylinder(C, A, 1.0, u=(0, 7)),
+        lambda: Cylinder(C, A, 1.0, v=(1, 1)),
+        lambda: Cone(C, A, 0.0),
+        lambda: Cone(C, A, 1.6),
+        lambda: Cone(C, A, 0.3, -1.0),
+        lambda: Sphere(C, np.inf),
+        lambda: Sphere(C, 1.0, v=(0, 2)),
+        lambda: Torus(C, A, 1.0, -1.0),
+        lambda: Plane(C, A).to_nurbs(),
+        lambda: Cylinder(C, A, 1.0).to_nurbs(),
+        lambda: Sphere(C, 1.0)(7.0, 0.0),
+        lambda: Sphere(C, 1.0)(0.0, 0.0, (0, -1)),
     ],
 )
 def test_arguments_without_meaning_are_refused(bad):
@@ -147,6 +148,6 @@ def test_arguments_without_meaning_are_refused(bad):
 def test_the_default_xdir_is_square_and_deterministic():
     assert (Plane((0, 0, 0), (0, 0, 5)).xdir == [1, 0, 0]).all()
     for axis in RNG.normal(size=(50, 3)):
-        c = Cylinder(O, axis, 1.0)
+        c = Cylinder(C, axis, 1.0)
         assert abs(c.xdir @ c.axis) < 1e-15
         assert np.linalg.norm(c.xdir) == pytest.approx(1, abs=1e-15)

@@ -1,10 +1,11 @@
 import numpy as np
 import pytest
+from scipy.special import ellipe
+
 from patchwright.models import NurbsCurve, ParameterError
 from patchwright.models.analytic.arc import circle
 from patchwright.models.arc_length import ArcLength
 from patchwright.models.knots import bezier_knots
-from scipy.special import ellipe
 
 CIRCLE = circle((0, 0, 0), (0, 0, 1), 1.0)
 

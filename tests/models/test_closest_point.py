@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+
 from patchwright.models import NurbsCurve, NurbsSurface, ParameterError, Plane, Sphere, Torus
 from patchwright.models.analytic.arc import circle
 from patchwright.models.closest_point import Status, closest_on_curve, closest_on_surface

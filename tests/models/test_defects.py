@@ -187,7 +187,7 @@ def test_t_junctions_lie_beside_an_unsplit_edge(ball, offset):
     out = t_junctions(ball, 0.02, offset=offset, seed=1)
     assert len(out.triangulation) == len(ball) + len(out.defects)
     for d in out.defects:
-        a, b, c = ball.corners[out.origin[d.triangles[0]]]
+        a, b, _ = ball.corners[out.origin[d.triangles[0]]]
         assert np.linalg.norm(d.where - 0.5 * (a + b)) == pytest.approx(offset, abs=1e-15)
     if not offset:
         assert out.triangulation.volume == pytest.approx(ball.volume, rel=1e-12)

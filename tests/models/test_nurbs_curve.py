@@ -5,6 +5,7 @@ import oracles_nurbs as oracle
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
 from patchwright.models import KnotError, NurbsCurve, ParameterError
 from patchwright.models.analytic.arc import circle
 from patchwright.models.knots import bezier_knots, distinct, greville, uniform_knots
@@ -134,7 +135,8 @@ def test_reversal(clamped):
 @pytest.mark.parametrize("multiplicity", [1, 2, 3])
 @pytest.mark.parametrize("rational", [False, True])
 def test_periodic_curves_unroll_with_their_continuity(multiplicity, rational):
-    """Of degree 3 with end multiplicity k: C(3 - k) across the seam, and shifted control points give the shifted curve."""
+    """Of degree 3 with end multiplicity k: C(3 - k) across the seam, and shifted control points give the
+    shifted curve."""
     rng = np.random.default_rng(5)
     values = np.array([0.0, 1.0, 1.5, 3.0, 4.0])
     k = np.full(5, multiplicity)

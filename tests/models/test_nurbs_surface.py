@@ -3,6 +3,7 @@ import oracles_nurbs as oracle
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
 from patchwright.models import KnotError, NurbsSurface, ParameterError, Sphere, Surface
 from patchwright.models.knots import bezier_knots, uniform_knots
 
@@ -145,16 +146,16 @@ def test_is_a_surface():
 @pytest.mark.parametrize(
     ("change", "error", "match"),
     [
-        (dict(knots=(bezier_knots(3), bezier_knots(2))), KnotError, "knots in v"),
-        (dict(knots=(bezier_knots(3)[::-1], bezier_knots(3))), KnotError, "decrease"),
-        (dict(control_points=np.full((4, 4, 3), np.nan)), ParameterError, "not finite"),
-        (dict(control_points=np.zeros((4, 4, 2))), ParameterError, r"\(n, m, 3\)"),
-        (dict(weights=np.zeros((4, 4))), ParameterError, "positive"),
-        (dict(weights=np.ones(4)), ParameterError, "shape"),
+        ({"knots": (bezier_knots(3), bezier_knots(2))}, KnotError, "knots in v"),
+        ({"knots": (bezier_knots(3)[::-1], bezier_knots(3))}, KnotError, "decrease"),
+        ({"control_points": np.full((4, 4, 3), np.nan)}, ParameterError, "not finite"),
+        ({"control_points": np.zeros((4, 4, 2))}, ParameterError, r"\(n, m, 3\)"),
+        ({"weights": np.zeros((4, 4))}, ParameterError, "positive"),
+        ({"weights": np.ones(4)}, ParameterError, "shape"),
     ],
 )
 def test_bad_input_is_refused(change, error, match):
-    good = dict(degree=(3, 3), knots=(bezier_knots(3), bezier_knots(3)), control_points=np.zeros((4, 4, 3)))
+    good = {"degree": (3, 3), "knots": (bezier_knots(3), bezier_knots(3)), "control_points": np.zeros((4, 4, 3))}
     with pytest.raises(error, match=match):
         NurbsSurface(**{**good, **change})
 
@@ -162,7 +163,7 @@ def test_bad_input_is_refused(change, error, match):
 def test_nothing_is_extrapolated():
     s = random_surface(0, (3, 3), False)
     for call in (s, s.grid):
-        with pytest.raises(ParameterError, match="parameter v = 1.5"):
+        with pytest.raises(ParameterError, match=r"parameter v = 1\.5"):
             call([0.5], [1.5])
         with pytest.raises(ParameterError, match="order"):
             call([0.5], [0.5], (-1, 0))

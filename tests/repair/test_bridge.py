@@ -3,6 +3,7 @@ from __future__ import annotations
 import dirty_shapes as shapes
 import numpy as np
 import pytest
+
 from patchwright.models import Triangulation
 from patchwright.repair.bridge import borders_of, bridge, facing_pairs, inner_share
 

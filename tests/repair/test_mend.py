@@ -6,6 +6,7 @@ from pathlib import Path
 import dirty_shapes as shapes
 import numpy as np
 import pytest
+
 from patchwright.models import ParameterError, Tolerance, Triangulation
 from patchwright.repair.mend import BRIDGED, CUT, KEPT, Mended, mend
 
@@ -185,3 +186,14 @@ def test_real_files(data: Callable[[str], Path], name: str, rims: list[int], vol
     assert not (result.origin == BRIDGED).any()
     if volume is not None:
         assert result.triangulation.volume == pytest.approx(volume, rel=1e-5)
+
+
+def test_a_rudder_tessellated_patch_by_patch(data: Callable[[str], Path]) -> None:
+    dirty = read(data("dtc_rudder.stl.gz"))
+    result = mended(dirty, "keep")
+    assert result.problems == ()
+    assert len(result.openings) == 1  # its upper end
+    assert (shapes.directed_uses(result.triangulation) == 1).all()
+    areas = result.triangulation.areas
+    assert areas[result.origin == BRIDGED].sum() < 2e-3 * areas.sum()
+    assert max(action.largest_move for action in result.actions) <= Tolerance.of(dirty).fit

@@ -3,6 +3,7 @@ from __future__ import annotations
 import dirty_shapes as shapes
 import numpy as np
 import pytest
+
 from patchwright.models import Triangulation
 from patchwright.repair.outer_hull import outer_hull
 

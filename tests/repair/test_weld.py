@@ -3,6 +3,7 @@ from __future__ import annotations
 import dirty_shapes as shapes
 import numpy as np
 import pytest
+
 from patchwright.models import ParameterError, Tolerance, Triangulation
 from patchwright.repair.weld import free_edge_curve, weld, weld_distance
 

@@ -3,6 +3,7 @@ from __future__ import annotations
 import dirty_shapes as shapes
 import numpy as np
 import pytest
+
 from patchwright.models import ParameterError, Triangulation
 from patchwright.repair.wrap import wrap
 
