@@ -135,6 +135,7 @@ def chains(tail: IntArray, head: IntArray, count: int) -> tuple[IntArray, IntArr
         in_next[head[i]] += 1
     out_next[:] = out_start[:-1]
     in_next[:] = in_start[:-1]
+    out_left, in_left = np.diff(out_start), np.diff(in_start)  # edges not walked yet
     used = np.zeros(n, np.bool_)
     place = np.full(count, -1, np.int64)  # of a vertex in the path being walked
     path = np.empty(n + 1, np.int64)
@@ -148,7 +149,7 @@ def chains(tail: IntArray, head: IntArray, count: int) -> tuple[IntArray, IntArr
             if sweep == 2 and (start >= n or used[start]):
                 continue
             seed = tail[start] if start < n else head[start - n]
-            outward, inward = out_start[seed + 1] - out_start[seed], in_start[seed + 1] - in_start[seed]
+            outward, inward = out_left[seed], in_left[seed]
             if sweep < 2 and ((outward + inward) % 2 == 0 or (sweep == 0 and outward < inward)):
                 continue
             length = 1
@@ -169,6 +170,8 @@ def chains(tail: IntArray, head: IntArray, count: int) -> tuple[IntArray, IntArr
                 else:
                     break
                 used[edge] = True
+                out_left[tail[edge]] -= 1
+                in_left[head[edge]] -= 1
                 if place[w] < 0:
                     place[w] = length
                     path[length] = w

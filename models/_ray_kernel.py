@@ -5,38 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from patchwright.models._exact_kernel import determinant, difference_tail
 from patchwright.models._tree_kernel import STACK, Boxes, Index
 from patchwright.models.arrays import Array, IntArray
 
 HUGE = 1e300  # stands for 1 / 0: its product with zero is zero
 SLACK = 4e-15  # on the parameters of box planes: more than their rounding
-
-
-@njit(cache=True, nogil=True)
-def two_product_tail(a: float, b: float, p: float) -> float:
-    """a b - p exactly, for p = fl(a b) (Dekker 1971)."""
-    c = 134217729.0 * a
-    ah = c - (c - a)
-    al = a - ah
-    c = 134217729.0 * b
-    bh = c - (c - b)
-    bl = b - bh
-    return al * bl - (((p - ah * bh) - al * bh) - ah * bl)
-
-
-@njit(cache=True, nogil=True)
-def exact_sign(a: float, b: float, c: float, d: float) -> float:
-    """A number of the sign of a b - c d, barring underflow."""
-    p, q = a * b, c * d
-    e, f = two_product_tail(a, b, p), two_product_tail(c, d, q)
-    s = e - f
-    z = s - e
-    tail = (e - (s - z)) + (-f - z)
-    difference = p - q
-    if abs(difference) > 4.5e-16 * (abs(p) + abs(q)):
-        return difference
-    total = difference + s  # the difference of two so near each other is exact (Sterbenz)
-    return total if total != 0.0 else tail
+ROUNDING = 3e-15  # of an edge function against the lengths in it: 24 units in the last place
 
 
 @njit(cache=True, nogil=True)
@@ -51,35 +26,53 @@ def ray_frame(direction: Array) -> tuple[int, int, int, float, float, float]:
 
 
 @njit(cache=True, nogil=True)
-def ray_triangle(
-    corners: Array, i: int, ox: float, oy: float, oz: float, kx: int, ky: int, kz: int, sx: float, sy: float, sz: float
-) -> tuple[float, float, float, float]:
-    """Parameter and barycentric coordinates of the crossing with row i of `corners`; parameter -1 if there is none.
+def exact_edge(corners: Array, i: int, p: int, q: int, origins: Array, r: int, frame: Array) -> float:
+    """The edge function of corners p and q of row i against ray r, with the sign it has in exact arithmetic."""
+    rows = np.empty((3, 3))
+    tails = np.empty((3, 3))
+    largest = 0.0
+    for k in range(3):
+        rows[0, k] = corners[i, 3 * p + k] - origins[r, k]
+        tails[0, k] = difference_tail(corners[i, 3 * p + k], origins[r, k], rows[0, k])
+        rows[1, k] = corners[i, 3 * q + k] - origins[r, k]
+        tails[1, k] = difference_tail(corners[i, 3 * q + k], origins[r, k], rows[1, k])
+        rows[2, k], tails[2, k] = frame[0, k], frame[1, k]
+        if abs(frame[0, k]) > abs(largest):
+            largest = frame[0, k]
+    return determinant(rows, tails) / largest
 
-    Watertight: the sheared corners are the same numbers in every triangle that has the corner, and the signs of the
-    edge functions of those numbers are exact, so that a line through a closed surface crosses it. The origin's
-    coordinates `ox, oy, oz` come in the frame's order of axes.
+
+@njit(cache=True, nogil=True)
+def ray_triangle(
+    corners: Array, i: int, origins: Array, r: int, frame: Array, kx: int, ky: int, kz: int, sx: float, sy: float
+) -> tuple[float, float, float, float]:
+    """Depth along axis kz and barycentric coordinates where ray r's line meets row i of `corners`; NaN if nowhere.
+
+    The edge functions of the sheared corners decide; those too small for their rounding are evaluated exactly from
+    the origin and the direction, `frame[0]` plus its rounding `frame[1]`. No line slips through between triangles.
     """
+    ox, oy, oz = origins[r, kx], origins[r, ky], origins[r, kz]
     az, bz, cz = corners[i, kz] - oz, corners[i, 3 + kz] - oz, corners[i, 6 + kz] - oz
     ax, ay = (corners[i, kx] - ox) - sx * az, (corners[i, ky] - oy) - sy * az
     bx, by = (corners[i, 3 + kx] - ox) - sx * bz, (corners[i, 3 + ky] - oy) - sy * bz
     cx, cy = (corners[i, 6 + kx] - ox) - sx * cz, (corners[i, 6 + ky] - oy) - sy * cz
     u, v, w = cx * by - cy * bx, ax * cy - ay * cx, bx * ay - by * ax
-    reach = max(max(max(abs(ax), abs(ay)), max(abs(bx), abs(by))), max(abs(cx), abs(cy)))
-    error = 9e-16 * reach * reach  # more than the rounding of u, v and w
+    wide = max(max(max(abs(ax), abs(ay)), max(abs(bx), abs(by))), max(abs(cx), abs(cy)))
+    far = wide + max(max(abs(az), abs(bz)), abs(cz))
+    error = (ROUNDING * wide + ROUNDING * ROUNDING * far) * far
     if min(min(u, v), w) < -error and max(max(u, v), w) > error:
-        return -1.0, 0.0, 0.0, 0.0
+        return np.nan, 0.0, 0.0, 0.0
     if min(min(abs(u), abs(v)), abs(w)) <= error:
-        u = u if abs(u) > error else exact_sign(cx, by, cy, bx)
-        v = v if abs(v) > error else exact_sign(ax, cy, ay, cx)
-        w = w if abs(w) > error else exact_sign(bx, ay, by, ax)
+        u = u if abs(u) > error else exact_edge(corners, i, 2, 1, origins, r, frame)
+        v = v if abs(v) > error else exact_edge(corners, i, 0, 2, origins, r, frame)
+        w = w if abs(w) > error else exact_edge(corners, i, 1, 0, origins, r, frame)
         if min(min(u, v), w) < 0.0 and max(max(u, v), w) > 0.0:
-            return -1.0, 0.0, 0.0, 0.0
+            return np.nan, 0.0, 0.0, 0.0
     total = u + v + w
     if total == 0.0:
-        return -1.0, 0.0, 0.0, 0.0
+        return np.nan, 0.0, 0.0, 0.0
     u, v, w = u / total, v / total, w / total
-    return (u * az + v * bz + w * cz) * sz, u, v, w
+    return u * az + v * bz + w * cz, u, v, w
 
 
 @njit(cache=True, nogil=True)
@@ -117,7 +110,8 @@ def first_hits(
     barycentric: Array,
 ) -> None:
     """Nearest hit of the rays `order`; `reach` and `distance` are lengths, whatever the length of the directions."""
-    direction = np.empty(3)
+    frame = np.zeros((2, 3))
+    direction = frame[0]
     stack = np.empty(STACK, np.int32)
     enter = np.empty(STACK)
     for r in order:
@@ -128,7 +122,6 @@ def first_hits(
         direction[0], direction[1], direction[2] = dx, dy, dz
         length = np.sqrt(dx * dx + dy * dy + dz * dz)
         kx, ky, kz, sx, sy, sz = ray_frame(direction)
-        ox, oy, oz = origins[r, kx], origins[r, ky], origins[r, kz]
         px, py, pz = origins[r, 0] - center[0], origins[r, 1] - center[1], origins[r, 2] - center[2]
         ix, iy, iz = inverse(direction[0]), inverse(direction[1]), inverse(direction[2])
         best = reach[r % reach.shape[0]] / length
@@ -159,7 +152,8 @@ def first_hits(
             if node < 0:
                 code = -(np.int64(node) + 1)
                 for i in range(code >> 3, (code >> 3) + (code & 7)):
-                    t, u, v, w = ray_triangle(corners, i, ox, oy, oz, kx, ky, kz, sx, sy, sz)
+                    t, u, v, w = ray_triangle(corners, i, origins, r, frame, kx, ky, kz, sx, sy)
+                    t *= sz
                     if t >= 0.0 and (t < best or (t == best and (found < 0 or index[i] < found))):
                         best, found, wa, wb, wc = t, np.int64(index[i]), u, v, w
         triangle[r] = found
@@ -176,17 +170,18 @@ def all_hits(
     count = np.zeros(n, np.int64)
     hits = np.empty((max(16, 2 * n), 5))
     stack = np.empty(STACK, np.int32)
-    direction = np.empty(3)
+    frame = np.zeros((2, 3))
+    direction = frame[0]
     filled = 0
     for r in range(n):
         length = 0.0
         for k in range(3):
             direction[k] = end[r, k] - start[r, k]
+            frame[1, k] = difference_tail(end[r, k], start[r, k], direction[k])
             length = max(length, abs(direction[k]))
         if length == 0.0:
             continue
         kx, ky, kz, sx, sy, sz = ray_frame(direction)
-        ox, oy, oz = start[r, kx], start[r, ky], start[r, kz]
         px, py, pz = start[r, 0] - center[0], start[r, 1] - center[1], start[r, 2] - center[2]
         ix, iy, iz = inverse(direction[0]), inverse(direction[1]), inverse(direction[2])
         stack[0] = 0
@@ -202,7 +197,8 @@ def all_hits(
                 continue
             code = -(np.int64(node) + 1)
             for i in range(code >> 3, (code >> 3) + (code & 7)):
-                t, u, v, w = ray_triangle(corners, i, ox, oy, oz, kx, ky, kz, sx, sy, sz)
+                t, u, v, w = ray_triangle(corners, i, start, r, frame, kx, ky, kz, sx, sy)
+                t *= sz
                 if not 0.0 <= t <= 1.0:
                     continue
                 if filled == hits.shape[0]:

@@ -4,10 +4,11 @@ The boxes are float32 and padded; they only decide what is looked at. Every dist
 the model's own frame. A query answers with the least (distance, triangle number), so the answer depends neither on the
 tree nor on the number of threads: equal distances go to the lowest triangle.
 
-Rays are watertight in the sense of Woop, Benthin & Wald, "Watertight ray/triangle intersection", J. Computer Graphics
-Techniques 2(1), 2013, with one departure: signs of edge functions are exact (error-free products), not merely repeated
-in double precision when zero. A line that meets a closed surface through an edge or a vertex is seen to meet it. A ray
-in the plane of a triangle does not hit that triangle, nor does any ray hit a triangle without area.
+Whether a line meets a triangle is decided as in exact arithmetic on the given coordinates, border included: the shear
+of Woop, Benthin & Wald, "Watertight ray/triangle intersection", J. Computer Graphics Techniques 2(1), 2013, in double
+precision with a bound on its rounding, and exact determinants where the bound does not decide. So no line slips through
+a closed surface at an edge or a vertex. A ray in the plane of a triangle does not hit that triangle, nor does any ray
+hit a triangle without area.
 
 Cost: building n log n; a query log n on surfaces, times what it finds.
 """
@@ -243,11 +244,16 @@ class Tree:
         return order
 
 
+def threads() -> int:
+    """How many threads to use: NUMBA_NUM_THREADS, or one per processor."""
+    from numba import config  # asking for numba's own threads would start its threading layer
+
+    return int(config.NUMBA_NUM_THREADS)
+
+
 def shares_of(rows: npt.NDArray[N]) -> list[npt.NDArray[N]]:
     """`rows` cut in one piece per thread, in a single piece if there are few."""
-    from numba import get_num_threads
-
-    return np.array_split(rows, max(1, min(int(get_num_threads()), len(rows) // BATCH)))
+    return np.array_split(rows, max(1, min(threads(), len(rows) // BATCH)))
 
 
 def side_by_side(jobs: list[Callable[[], T]]) -> list[T]:

@@ -144,7 +144,11 @@ def quad_quality(m, q, quads, outward):
         wx, wy, wz = X[before, 0] - X[p, 0], X[before, 1] - X[p, 1], X[before, 2] - X[p, 2]
         px, py, pz = nx, ny, nz
         if m.kind[p] == 0:
-            px, py, pz = N[p, 0], N[p, 1], N[p, 2]
+            # half way to the quad's own plane, for quads that bend round an edge
+            px, py, pz = px + N[p, 0], py + N[p, 1], pz + N[p, 2]
+            length = np.sqrt(px * px + py * py + pz * pz)
+            if length > 0.0:
+                px, py, pz = px / length, py / length, pz / length
         size = np.sqrt((ux * ux + uy * uy + uz * uz) * (wx * wx + wy * wy + wz * wz))
         if size == 0.0:
             return -1.0
@@ -261,7 +265,7 @@ def smooth_quads(m, g, quads, outward, offsets, around, near_offsets, near, low,
 
 @njit(cache=True, nogil=True)
 def update_outward(m, g, quads, regions, outward):
-    """Surface normals at the quads' centres, walked to from a corner."""
+    """Mean surface normals at the quads' centres and smooth corners; the centres are walked to from the corners."""
     X = m.X
     starts = np.empty(128, dtype=np.int64)
     for q in range(len(quads)):
@@ -271,9 +275,17 @@ def update_outward(m, g, quads, regions, outward):
             n = starts_of(m, g, p, regions[q], starts, n)
             x, y, z = x + 0.25 * X[p, 0], y + 0.25 * X[p, 1], z + 0.25 * X[p, 2]
         _, _, _, at = put_on(x, y, z, outward[q, 0], outward[q, 1], outward[q, 2], starts, n, g)
-        if at >= 0:
-            for d in range(3):
-                outward[q, d] = g.normal[at, d]
+        if at < 0:
+            continue
+        # with the normals at smooth corners: the centre of a quad that bends round an edge may land on either skin
+        ox, oy, oz = g.normal[at, 0], g.normal[at, 1], g.normal[at, 2]
+        for k in range(4):
+            p = quads[q, k]
+            if m.kind[p] == 0:
+                ox, oy, oz = ox + m.N[p, 0], oy + m.N[p, 1], oz + m.N[p, 2]
+        size = np.sqrt(ox * ox + oy * oy + oz * oz)
+        if size > 0.0:
+            outward[q, 0], outward[q, 1], outward[q, 2] = ox / size, oy / size, oz / size
 
 
 @njit(cache=True, nogil=True)

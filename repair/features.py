@@ -19,6 +19,7 @@ HYSTERESIS = 0.6  # of the angle: how far a sharp line may fade
 CORNER_TURN = 40.0  # degrees a feature line turns at a corner
 SPECK_EDGES = 5  # a line of fewer edges and shorter than SPECK_SHARE is noise unless both its ends are attached
 SPECK_SHARE = 0.01  # of the diagonal
+SLIT = 1e-3  # of the diagonal: two lines between the same ends, nearer to each other, are one
 NOISY_HEIGHT = 20.0  # times the noise: a lower triangle's own normal is off by degrees
 NEEDLE_HEIGHT = 6.0  # times the noise: a lower triangle has no normal of its own
 FOLLOWED, SHARP, BOUNDARY = 1, 2, 3  # kinds of curves: only followed, sharp, boundary
@@ -104,7 +105,11 @@ def find_features(triangulation: Triangulation, *, angle: float = 30.0, frozen: 
     offsets, incident = _incident(edges, len(points))
     kernel.grow_ends(points, edges, offsets, incident, grown, weak & ~free)
     sharp |= grown & ~firm
-    sharp &= _not_specks(edges, sharp | firm, firm, length, body.diagonal)
+    for _ in range(2):
+        sharp &= _not_slits(
+            edges, sharp | firm, firm, length, cosine, points, max(NOISY_HEIGHT * noise, SLIT * body.diagonal)
+        )
+        sharp &= _not_specks(edges, sharp | firm, firm, length, body.diagonal)
     kind = np.where(free, BOUNDARY, np.where(sharp, SHARP, np.where(follow, FOLLOWED, 0)))
     return _chains(body, neighbours, normals, noise, edges, sides, kind, first, second)
 
@@ -302,11 +307,47 @@ def _not_specks(edges: IntArray, feature: BoolArray, firm: BoolArray, length: Ar
         begin, finish = vertices[rows], vertices[rows + pieces]
         loose = (degree[begin] == 1) | (degree[finish] == 1)
         ring = (begin == finish) & (degree[begin] == 2)
-        short = (size < SPECK_SHARE * diagonal) & (pieces < SPECK_EDGES)
+        short = (size < SPECK_SHARE * diagonal) & ((pieces < SPECK_EDGES) | (size < 0.5 * SPECK_SHARE * diagonal))
         poor = short & (loose | ring)
         drop = picked[poor[chain]]
         drop = drop[~firm[drop]]
         if not len(drop):
             break
         keep[drop] = False
+    return keep
+
+
+def _not_slits(
+    edges: IntArray, feature: BoolArray, firm: BoolArray, length: Array, cosine: Array, points: Array, width: float
+) -> BoolArray:
+    """(e,) False for the blunter of two lines between the same two ends that run nearer than `width` side by side."""
+    from patchwright.repair import _feature_kernel as kernel
+
+    keep = np.ones(len(edges), dtype=bool)
+    picked = np.flatnonzero(feature)
+    if not len(picked):
+        return keep
+    ends = np.ascontiguousarray(edges[picked])
+    offsets, incident = _incident(ends, len(points))
+    starts, vertices, _, chain = kernel.trace(ends, offsets, incident, np.diff(offsets) != 2)
+    pieces = np.diff(starts)
+    count = len(pieces)
+    rows = starts[:-1] + np.arange(count)
+    begin, finish = vertices[rows], vertices[rows + pieces]
+    size = np.bincount(chain, weights=length[picked], minlength=count)
+    blunt = np.bincount(chain, weights=(cosine * length)[picked], minlength=count) / np.where(size > 0, size, 1.0)
+    middle = np.zeros((count, 3))
+    for d in range(3):
+        mean = points[edges[picked], d].mean(axis=1) * length[picked]
+        middle[:, d] = np.bincount(chain, weights=mean, minlength=count) / np.where(size > 0, size, 1.0)
+    key = np.minimum(begin, finish) * len(points) + np.maximum(begin, finish)
+    order = np.lexsort((blunt, key))
+    one, two = order[:-1], order[1:]
+    near = np.linalg.norm(middle[one] - middle[two], axis=1) < width
+    alike = np.abs(size[one] - size[two]) < 0.3 * np.maximum(size[one], size[two]) + width
+    drop = np.zeros(count, dtype=bool)
+    drop[two] = (key[one] == key[two]) & near & alike & (begin[two] != finish[two])
+    drop |= (begin == finish) & (np.diff(offsets)[begin] > 2) & (size < 4.0 * width)
+    which = picked[drop[chain]]
+    keep[which[~firm[which]]] = False
     return keep

@@ -47,9 +47,7 @@ def quadriflow(features: Features, target: int | None) -> tuple[QuadMesh, Featur
         the same Euler characteristic and openness as the triangulation.
     """
     if importlib.util.find_spec("pyQuadriFlow") is None:
-        raise EngineError(
-            'the layout method "quadriflow" needs the package pyquadriflow (patchwright[quadriflow])'
-        )
+        raise EngineError('the layout method "quadriflow" needs the package pyquadriflow (patchwright[quadriflow])')
     vertices, quads = _run(features, DEFAULT_QUADS if target is None else target)
     _check(vertices, quads, features)
     return _place(vertices, quads, features)

@@ -13,7 +13,7 @@ from patchwright.repair.features import Features
 
 ANGLE_PER_QUAD = 30.0  # degrees of turn one bicubic piece takes
 LARGEST, SMALLEST = 0.15, 0.004  # of the diagonal: quads
-GRADING = 0.35  # growth of the size per length
+GRADING = 0.45  # growth of the size per length
 STRIP_ASPECT = 3.0  # longest quad in a strip between features against the strip's width
 MOST_QUADS = 1500  # where no number is asked for
 AREA_PER_QUAD = 0.85  # mean area of a quad against its size squared, measured on graded layouts
@@ -121,7 +121,9 @@ def _curve_sizes(features: Features, quad_angle: float) -> tuple[IntArray, Array
     bend = np.linalg.norm(place(at - step) - 2.0 * place(at) + place(at + step), axis=1)
     bend = np.divide(bend, step**2, out=np.zeros_like(bend), where=step > 0)
     size = np.divide(quad_angle, bend, out=np.full_like(bend, np.inf), where=bend > 0)
-    size = np.minimum(size, 0.5 * length)
+    # a curve below the smallest size must be there but asks for nothing round it
+    least = SMALLEST * features.body.diagonal
+    size = np.where(length > 2.0 * least, np.minimum(size, 0.5 * length), np.inf)
     # strips: the nearest point of another curve, unless both run into the same corner
     nearest = np.full(len(points), np.inf)
     tree = cKDTree(points)
@@ -133,7 +135,7 @@ def _curve_sizes(features: Features, quad_angle: float) -> tuple[IntArray, Array
     rows = np.flatnonzero(first >= 0)
     nearest[rows] = gap[rows, first[rows]]
     ends = np.minimum(s, length - s)
-    strip = (nearest > 0) & (ends > 1.5 * nearest)
+    strip = (nearest > 0.25 * least) & (ends > 1.5 * nearest)
     size = np.where(strip, np.minimum(size, STRIP_ASPECT * nearest), size)
     return features.vertices, size
 

@@ -31,7 +31,7 @@ def cross(a: Rational, b: Rational) -> Rational:
 
 
 def ray_crossings(corners: np.ndarray, origin, direction) -> dict[int, Fraction]:
-    """Exactly: the triangles the line origin + t direction crosses (border included) and t; parallel ones do not count."""
+    """Exactly: the triangles the line origin + t direction crosses, border included, and t; not parallel ones."""
     o, d = rational(origin), rational(direction)
     found = {}
     for number, triangle in enumerate(corners):
@@ -98,7 +98,7 @@ def _clip(polygon: list[Rational], a: Rational, inward: Rational) -> list[Ration
 
 
 def common_part(p: np.ndarray, q: np.ndarray) -> list[Rational]:
-    """Exactly: the distinct corners of the intersection of two triangles with area (a point, a stretch or a polygon)."""
+    """Exactly: the corners of what two triangles with area have in common (a point, a stretch or a polygon)."""
     first = [rational(x) for x in p]
     a, b, c = (rational(x) for x in q)
     n = cross(minus(b, a), minus(c, a))
@@ -124,3 +124,38 @@ def crosses(p: np.ndarray, q: np.ndarray) -> bool:
 
     spread = cross(minus(part[1], part[0]), minus(part[-1], part[0]))
     return any(spread) or inside(p) or inside(q)
+
+
+def icosphere(level: int) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices on the unit sphere and outward triangles: the octahedron split `level` times."""
+    vertices = [(1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1)]
+    points = [np.array(v, dtype=float) for v in vertices]
+    triangles = [(0, 2, 4), (2, 1, 4), (1, 3, 4), (3, 0, 4), (2, 0, 5), (1, 2, 5), (3, 1, 5), (0, 3, 5)]
+    for _ in range(level):
+        middles: dict[tuple[int, int], int] = {}
+
+        def middle(a: int, b: int, middles: dict[tuple[int, int], int] = middles) -> int:
+            key = (min(a, b), max(a, b))
+            if key not in middles:
+                point = points[a] + points[b]
+                points.append(point / np.linalg.norm(point))
+                middles[key] = len(points) - 1
+            return middles[key]
+
+        split = []
+        for a, b, c in triangles:
+            d, e, f = middle(a, b), middle(b, c), middle(c, a)
+            split += [(a, d, f), (d, b, e), (f, e, c), (d, e, f)]
+        triangles = split
+    return np.array(points), np.array(triangles)
+
+
+def noisy_torus(n: int, m: int, noise: float = 0.0, shift=(0.0, 0.0, 0.0)) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices and 2 n m outward triangles of a torus with radii 10 and 3, its vertices jittered by `noise`."""
+    i, j = (x.ravel() for x in np.meshgrid(np.arange(n), np.arange(m), indexing="ij"))
+    u, v = 2 * np.pi * i / n, 2 * np.pi * j / m
+    vertices = np.stack([(10 + 3 * np.cos(v)) * np.cos(u), (10 + 3 * np.cos(v)) * np.sin(u), 3 * np.sin(v)], 1)
+    vertices = vertices + np.random.default_rng(0).normal(size=vertices.shape) * noise + np.asarray(shift)
+    a, b = i * m + j, (i + 1) % n * m + j
+    c, d = (i + 1) % n * m + (j + 1) % m, i * m + (j + 1) % m
+    return vertices, np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])

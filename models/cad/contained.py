@@ -8,6 +8,7 @@ replaced at the next call. Threads take turns.
 from __future__ import annotations
 
 import atexit
+import gc
 import importlib
 import os
 import pickle
@@ -63,6 +64,7 @@ def serve() -> None:
     nothing = os.open(os.devnull, os.O_RDWR)
     for stream in (0, 1, 2):  # native code prints to these
         os.dup2(nothing, stream)
+    gc.disable()  # calls make many objects that live; the garbage is looked for between calls
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # an interrupt is the caller's to handle
     while True:
         head = source.read(_HEAD.size)
@@ -73,6 +75,8 @@ def serve() -> None:
         sink.write(_HEAD.pack(len(answer)))
         sink.write(answer)
         sink.flush()
+        del answer
+        gc.collect()
 
 
 def _answer(request: bytes) -> bytes:
@@ -176,7 +180,7 @@ def _call(name: str, arguments: Any, options: Any, time_limit: float, what: str)
             if took >= time_limit:
                 raise EngineError(f"the CAD kernel did not finish within {time_limit:.0f} s while {what}")
             raise EngineError(f"the CAD kernel crashed ({_cause(code)}) while {what}")
-    done, value, caught = pickle.loads(answer)
+    done, value, caught = _loaded(answer)
     for category, text in caught:
         warnings.warn(category(text), stacklevel=4)
     if done:
@@ -184,6 +188,17 @@ def _call(name: str, arguments: Any, options: Any, time_limit: float, what: str)
     if type(value) is EngineError and "while" not in str(value):
         raise EngineError(f"the CAD kernel failed while {what}: {value}")
     raise value
+
+
+def _loaded(answer: bytes) -> Any:
+    """The unpickled answer; the garbage collector would walk its growing thousands of objects again and again."""
+    collecting = gc.isenabled()
+    gc.disable()
+    try:
+        return pickle.loads(answer)
+    finally:
+        if collecting:
+            gc.enable()
 
 
 def _cause(code: int) -> str:

@@ -65,7 +65,7 @@ def curve_to_kernel(curve: NurbsCurve) -> Any:
 
 
 def plain_curve(degree: int, knots: Array, points: Array) -> NurbsCurve:
-    """A curve without weights from fresh arrays that the kernel vouches for: its checks would take most of the reading."""
+    """A curve without weights from fresh arrays that the kernel vouches for: checking them would dominate reading."""
     if set(NurbsCurve.__slots__) != _FIELDS:
         return NurbsCurve(degree, knots, points)
     knots.flags.writeable = points.flags.writeable = False

@@ -102,7 +102,7 @@ def _face_names(transfer: Any, shape: Any, faces: list[Any]) -> dict[int, str]:
         if isinstance(entity, kernel.StepRepr_RepresentationItem) and (name := _entity_name(entity)):
             found = kernel.STEPConstruct.FindShape_s(process, entity)
             if found is not None and not found.IsNull():
-                for face in faces_of(found):
+                for face in [found] if found.ShapeType() == kernel.FACE else faces_of(found):
                     by_plain[plain.FindIndex(unlocated(face))] = name
     for shell, entity in _iges_shells(transfer, shape, entities):
         for place, face in enumerate(children(shell, (kernel.FACE,)), 1):

@@ -8,15 +8,18 @@ from typing import Any
 
 import numpy as np
 
+from patchwright.models.arrays import Array, IntArray
 from patchwright.models.assembly import Assembly, Part
 from patchwright.models.cad import kernel
 from patchwright.models.cad.blocks import RawMesh
+from patchwright.models.cad.connectivity import is_point
 from patchwright.models.cad.convert_topology import convert_faces, trims_of
 from patchwright.models.cad.names import face_index, names_of
 from patchwright.models.cad.native import NativeFace, encode, faces_of
 from patchwright.models.cad.tessellate import ANGLE, tessellate
 from patchwright.models.errors import CorruptFile, RepairWarning, UnsupportedEntity
 from patchwright.models.surface import Surface
+from patchwright.models.topology import Topology
 from patchwright.models.triangulation import Triangulation
 
 
@@ -70,7 +73,8 @@ def assembly_of(
         if mesh is None:
             bare.append(name)
         trims = trims_of(converted.topology.loops[i])
-        triangulation = _triangulation(mesh, surface, float(converted.v_scale[i]), outward)
+        seamed = _is_seamed(converted.topology, i)
+        triangulation = _triangulation(mesh, surface, float(converted.v_scale[i]), outward, seamed)
         parts.append(Part(name, triangulation, surface, trims, body, NativeFace(native, place.FindIndex(faces[i]) - 1)))
     if bare:
         which = ", ".join(bare[:3])
@@ -87,27 +91,41 @@ def assembly_of(
     return Assembly(tuple(parts), unit="mm", source=source, topology=converted.topology, native=native)
 
 
-def _triangulation(mesh: RawMesh | None, surface: Surface, v_scale: float, outward: bool) -> Triangulation:
-    """The mesh with equal nodes merged (seams, poles), wound outward, its (u, v) in our parameters."""
+def _triangulation(
+    mesh: RawMesh | None, surface: Surface, v_scale: float, outward: bool, seamed: bool
+) -> Triangulation:
+    """The mesh wound outward, its (u, v) in our parameters; equal nodes merged where there is a seam or a pole."""
     if mesh is None:
         return Triangulation(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64))
     nodes, uv, triangles = mesh
     if v_scale != 1.0:
         uv = uv * np.array([1.0, v_scale])
     low, high = np.array(surface.domain).T
-    uv = np.clip(uv, low, high)
+    corner_uv, corners = np.clip(uv, low, high)[triangles], triangles
+    if seamed:
+        corners = _merged(nodes)[triangles]
+        flat = (corners[:, 0] == corners[:, 1]) | (corners[:, 1] == corners[:, 2]) | (corners[:, 2] == corners[:, 0])
+        corners, corner_uv = corners[~flat], corner_uv[~flat]
+    if not outward:
+        corners, corner_uv = corners[:, ::-1], corner_uv[:, ::-1]
+    made = Triangulation(nodes, corners, uv=corner_uv)
+    return made.compact() if seamed else made
+
+
+def _merged(nodes: Array) -> IntArray:
+    """(n,) for every node the first of those at exactly its place."""
     order = np.lexsort(nodes.T)
     fresh = np.ones(len(nodes), dtype=bool)
     fresh[1:] = (nodes[order][1:] != nodes[order][:-1]).any(axis=1)
-    first = order[np.flatnonzero(fresh)[np.cumsum(fresh) - 1]]  # one node for every group of equal ones
-    merged = np.empty(len(nodes), dtype=np.int64)
-    merged[order] = first
-    corners = merged[triangles]
-    flat = (corners[:, 0] == corners[:, 1]) | (corners[:, 1] == corners[:, 2]) | (corners[:, 2] == corners[:, 0])
-    corners, corner_uv = corners[~flat], uv[triangles[~flat]]
-    if not outward:
-        corners, corner_uv = corners[:, ::-1], corner_uv[:, ::-1]
-    return Triangulation(nodes, corners, uv=corner_uv).compact()
+    out = np.empty(len(nodes), dtype=np.int64)
+    out[order] = order[np.flatnonzero(fresh)[np.cumsum(fresh) - 1]]
+    return out
+
+
+def _is_seamed(topology: Topology, face: int) -> bool:
+    """Whether the face meets itself: an edge it uses twice, or a pole."""
+    edges = [use.edge for loop in topology.loops[face] for use in loop]
+    return not edges or len(set(edges)) < len(edges) or any(is_point(topology.curves[e]) for e in edges)
 
 
 def _contents(reader: Any) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -90,7 +91,7 @@ def test_loops_use_every_free_edge_once_and_no_vertex_twice(triangles):
     for loop, closed in zip(loops, loops.closed, strict=True):
         assert len(set(loop.tolist())) == len(loop)
         chain = [*loop, loop[0]] if closed else list(loop)
-        used += [tuple(sorted(map(int, pair))) for pair in zip(chain[:-1], chain[1:], strict=True)]
+        used += [tuple(sorted(map(int, pair))) for pair in pairwise(chain)]
     assert sorted(used) == [tuple(e) for e in found.edges[found.free].tolist()]
     degree = np.bincount(found.edges[found.free].ravel(), minlength=12)
     assert np.count_nonzero(~loops.closed) == np.count_nonzero(degree % 2) / 2
