@@ -59,7 +59,9 @@ class Assembly:
     native: Any = None
 
     @classmethod
-    def of(cls, things: Triangulation | Surface | Part | Iterable[Any], *, unit: str = "unknown", source: str = "") -> Assembly:
+    def of(
+        cls, things: Triangulation | Surface | Part | Iterable[Any], *, unit: str = "unknown", source: str = ""
+    ) -> Assembly:
         """An assembly of triangulations, surfaces or parts; surfaces are given an empty triangulation."""
         items: list[Any] = list(things) if isinstance(things, list | tuple) else [things]
         parts = []

@@ -45,4 +45,6 @@ class StructuredGrid:
         points = [b.reshape(-1, 3) for b in self.blocks]
         if not points:
             return np.zeros((2, 3))
-        return np.stack([np.min([p.min(axis=0) for p in points], axis=0), np.max([p.max(axis=0) for p in points], axis=0)])
+        return np.stack(
+            [np.min([p.min(axis=0) for p in points], axis=0), np.max([p.max(axis=0) for p in points], axis=0)]
+        )

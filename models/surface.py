@@ -12,7 +12,6 @@ if TYPE_CHECKING:
     from patchwright.models.nurbs_surface import NurbsSurface
 
 
-
 @runtime_checkable
 class Surface(Protocol):
     """A parametric surface in R^3."""

@@ -45,4 +45,9 @@ class Tolerance:
         single_precision = 4.0 * float(np.finfo(np.float32).eps) * reach
         if fit is not None and not (np.isfinite(fit) and fit > 0.0):
             raise ParameterError(f"the fit tolerance must be a positive length, got {fit}")
-        return cls(max(ROUND_OFF_SHARE * diagonal, single_precision), FIT_SHARE * diagonal if fit is None else fit, angle, fit is not None)
+        return cls(
+            max(ROUND_OFF_SHARE * diagonal, single_precision),
+            FIT_SHARE * diagonal if fit is None else fit,
+            angle,
+            fit is not None,
+        )

@@ -89,7 +89,9 @@ def repair(
     output: Annotated[Path | None, typer.Option("-o", "--output", help="Output folder [<stem>-patchwright].")] = None,
     scope: Annotated[Scope, typer.Option(help="least keeps what is good; all resurfaces everything.")] = Scope.least,
     openings: Annotated[Openings, typer.Option(help="Keep or close planned openings.")] = Openings.keep,
-    tolerance: Annotated[float | None, typer.Option(help="Fit tolerance in model units [1e-4 of the diagonal].")] = None,
+    tolerance: Annotated[
+        float | None, typer.Option(help="Fit tolerance in model units [1e-4 of the diagonal].")
+    ] = None,
     json: Json = False,
     quiet: Quiet = False,
 ) -> None:
@@ -142,7 +144,9 @@ def convert(
         assembly = read(source)
         report("writing", 0.5)
         write(target, assembly)
-    _say(f"{source} -> {target}: {len(assembly.parts)} parts, {sum(len(p.triangulation) for p in assembly.parts)} triangles")
+    _say(
+        f"{source} -> {target}: {len(assembly.parts)} parts, {sum(len(p.triangulation) for p in assembly.parts)} triangles"
+    )
 
 
 def _version(wanted: bool) -> None:
@@ -155,7 +159,9 @@ def _version(wanted: bool) -> None:
 
 @app.callback()
 def _root(
-    version: Annotated[bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version.")] = False,
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version.")
+    ] = False,
 ) -> None:
     pass
 
@@ -213,7 +219,7 @@ def main() -> None:
         code = _fail(INTERRUPTED, 130)
     except MemoryError:
         code = _fail("out of memory; try a coarser file or a larger machine", INTERNAL)
-    except Exception as error:  # noqa: BLE001 - the one place where the unforeseen becomes a sentence
+    except Exception as error:
         if hasattr(error, "show") and hasattr(error, "exit_code"):  # typer's usage errors, whichever click it runs on
             error.show()
             sys.exit(BAD_INPUT)
@@ -221,7 +227,9 @@ def main() -> None:
             sys.exit(_fail(INTERRUPTED, 130))
         if os.environ.get("PATCHWRIGHT_TRACEBACK"):
             raise
-        sentence = f"internal failure ({type(error).__name__}: {error}); set PATCHWRIGHT_TRACEBACK=1 and report the trace"
+        sentence = (
+            f"internal failure ({type(error).__name__}: {error}); set PATCHWRIGHT_TRACEBACK=1 and report the trace"
+        )
         code = _fail(sentence, INTERNAL)
     sys.exit(code if isinstance(code, int) else DONE)
 

@@ -81,7 +81,9 @@ def _spots(study: Study) -> list[Scene]:
         scene = Scene(study.folder / f"defect-{number}.png", f"{defect.kind} at {_coordinates(where)}", box)
         scene.surface(body.take(near).compact(), edges=True)
         if len(edges):
-            scene.lines(edges[(np.abs(edges.mean(axis=1) - where) < 1.5 * reach).all(axis=1)], colour="#c03030", width=3.0)
+            scene.lines(
+                edges[(np.abs(edges.mean(axis=1) - where) < 1.5 * reach).all(axis=1)], colour="#c03030", width=3.0
+            )
         scene.points(where[None], colour="#c03030", width=14.0)
         scenes.append(scene)
     return scenes

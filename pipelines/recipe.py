@@ -1,12 +1,12 @@
 """Recipes: a TOML file that names the source, the folder and the stages, and the default recipe of `repair`.
 
-    source = "wing.stl"
-    folder = "wing-patchwright"
-    tolerance = 0.001        # fit tolerance, model units; left out: 1e-4 of the diagonal
+source = "wing.stl"
+folder = "wing-patchwright"
+tolerance = 0.001        # fit tolerance, model units; left out: 1e-4 of the diagonal
 
-    [[stage]]
-    name = "repair"
-    openings = "close"
+[[stage]]
+name = "repair"
+openings = "close"
 """
 
 from __future__ import annotations
@@ -47,8 +47,9 @@ def default_folder(source: Path) -> Path:
     return Path(f"{stem}-patchwright")
 
 
-def repair_recipe(source: Path, folder: Path | None, *, scope: str = "least", openings: str = "keep",
-                  tolerance: float | None = None) -> Recipe:
+def repair_recipe(
+    source: Path, folder: Path | None, *, scope: str = "least", openings: str = "keep", tolerance: float | None = None
+) -> Recipe:
     """What `patchwright repair` does."""
     steps = (
         Step("diagnose", {}),

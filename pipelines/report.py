@@ -15,7 +15,18 @@ from patchwright.pipelines.progress import Report
 from patchwright.pipelines.study import Study
 from patchwright.pipelines.summary import study_json
 
-PACKAGES = ("patchwright", "numpy", "scipy", "numba", "manifold3d", "cadquery-ocp-novtk", "open3d-cpu", "open3d", "pyvista", "vtk")
+PACKAGES = (
+    "patchwright",
+    "numpy",
+    "scipy",
+    "numba",
+    "manifold3d",
+    "cadquery-ocp-novtk",
+    "open3d-cpu",
+    "open3d",
+    "pyvista",
+    "vtk",
+)
 PICTURES = ("before.png", "after.png", "deviation.png")
 MOST_ROWS = 200
 
@@ -50,11 +61,15 @@ def html(told: dict[str, Any], folder: Path) -> str:
     environment = Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
     environment.filters["number"] = _number
     environment.filters["place"] = _place
-    template = environment.from_string((files("patchwright.pipelines") / "report.html.jinja").read_text(encoding="utf-8"))
+    template = environment.from_string(
+        (files("patchwright.pipelines") / "report.html.jinja").read_text(encoding="utf-8")
+    )
     pictures = {name: _embedded(folder / name) for name in PICTURES if name in told["files"]}
     spots = {name: _embedded(folder / name) for name in told["files"] if name.startswith("defect-")}
     seams = sorted(told.get("seams", []), key=lambda s: (s["kind"] != "smooth", -(s["angle"] or 0.0)))
-    return template.render(t=told, pictures=pictures, spots=spots, seams=seams[:MOST_ROWS], most=MOST_ROWS, name=Path(told["source"]).name)
+    return template.render(
+        t=told, pictures=pictures, spots=spots, seams=seams[:MOST_ROWS], most=MOST_ROWS, name=Path(told["source"]).name
+    )
 
 
 def _embedded(path: Path) -> str:

@@ -44,7 +44,10 @@ def run(recipe: Recipe | Path | str, *, assembly: Assembly | None = None, termin
     if not any(len(part.triangulation) for part in assembly.parts):
         raise ParameterError(f"{plan.source}: holds no faces and no triangles; there is nothing to work on")
     study = Study(
-        str(plan.source), plan.folder, assembly, Tolerance.of(assembly, fit=plan.tolerance),
+        str(plan.source),
+        plan.folder,
+        assembly,
+        Tolerance.of(assembly, fit=plan.tolerance),
         reports=(StageReport("read", time.perf_counter() - started),),
     )
     for step in plan.steps:

@@ -28,7 +28,9 @@ class Scene:
     layers: list[dict[str, Any]] = field(default_factory=list)
     arrays: dict[str, Any] = field(default_factory=dict)
 
-    def surface(self, triangulation: Triangulation, *, values: Any = None, colours: Any = None, **options: Any) -> Scene:
+    def surface(
+        self, triangulation: Triangulation, *, values: Any = None, colours: Any = None, **options: Any
+    ) -> Scene:
         """Triangles in one colour, by `values` (m,) or by `colours` (m, 3) uint8."""
         key = f"{self.path.name}.{len(self.layers)}"
         self.arrays[f"{key}.vertices"] = triangulation.vertices

@@ -41,11 +41,15 @@ def against_truth(repaired: Repaired, truth: Truth, diagonal: float) -> dict[str
 
 
 def _spread(out: dict[str, Any], label: str, shares: Array) -> None:
-    for name, value in zip(("median", "99 %", "largest"), (*np.percentile(shares, [50.0, 99.0]), shares.max()), strict=True):
+    for name, value in zip(
+        ("median", "99 %", "largest"), (*np.percentile(shares, [50.0, 99.0]), shares.max()), strict=True
+    ):
         out[f"{label}, {name} (of the diagonal)"] = float(value)
 
 
-def against_injected(injected: Sequence[Injected], diagnosis: Diagnosis, repaired: Repaired, jitter: float) -> dict[str, Any]:
+def against_injected(
+    injected: Sequence[Injected], diagnosis: Diagnosis, repaired: Repaired, jitter: float
+) -> dict[str, Any]:
     """Which injected holes and slits the diagnosis names: found, missed, and reports where nothing was injected."""
     holes = [i for i in injected if i.kind == "gap"]
     reports = [d for d in diagnosis.defects if d.kind in MISSING and d.count > 0 and d.severity != "info"]
@@ -69,4 +73,3 @@ def against_injected(injected: Sequence[Injected], diagnosis: Diagnosis, repaire
         "area labelled as invented": bridged,
         "labelled to injected area": bridged / injected_area if injected_area else 0.0,
     }
-

@@ -69,24 +69,38 @@ def _add(plotter: Any, pv: Any, layer: dict[str, Any], arrays: dict[str, Any]) -
         if f"{key}.values" in arrays:
             mesh.cell_data["values"] = arrays[f"{key}.values"]
             bar = {"title": layer.get("bar", ""), "color": "#222222", "n_labels": 5, "fmt": "%.1e"}
-            plotter.add_mesh(mesh, scalars="values", cmap="viridis", clim=layer.get("range"), scalar_bar_args=bar, **options)
+            plotter.add_mesh(
+                mesh, scalars="values", cmap="viridis", clim=layer.get("range"), scalar_bar_args=bar, **options
+            )
         elif f"{key}.colours" in arrays:
             mesh.cell_data["rgb"] = arrays[f"{key}.colours"]
             plotter.add_mesh(mesh, scalars="rgb", rgb=True, **options)
         else:
-            plotter.add_mesh(mesh, color=layer.get("colour", "#b8c4d0"), show_edges=layer.get("edges", False),
-                             edge_color="#5a6672", line_width=0.5, **options)
+            plotter.add_mesh(
+                mesh,
+                color=layer.get("colour", "#b8c4d0"),
+                show_edges=layer.get("edges", False),
+                edge_color="#5a6672",
+                line_width=0.5,
+                **options,
+            )
     elif kind == "lines":
         points = arrays[f"{key}.points"]
         if len(points):
             cells = np.column_stack([np.full(len(points) // 2, 2), np.arange(len(points)).reshape(-1, 2)]).ravel()
             mesh = pv.PolyData(points, lines=cells)
-            plotter.add_mesh(mesh, color=layer.get("colour", "#c03030"), line_width=layer.get("width", 2.0), lighting=False)
+            plotter.add_mesh(
+                mesh, color=layer.get("colour", "#c03030"), line_width=layer.get("width", 2.0), lighting=False
+            )
     elif kind == "points":
         points = arrays[f"{key}.points"]
         if len(points):
-            plotter.add_points(points, color=layer.get("colour", "#c03030"), point_size=layer.get("width", 9.0),
-                               render_points_as_spheres=True)
+            plotter.add_points(
+                points,
+                color=layer.get("colour", "#c03030"),
+                point_size=layer.get("width", 9.0),
+                render_points_as_spheres=True,
+            )
 
 
 def main(archive: str) -> int:

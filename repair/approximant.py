@@ -15,7 +15,9 @@ from patchwright.models.errors import ParameterError
 from patchwright.models.nurbs_surface import NurbsSurface
 
 
-def bicubic_approximant(points: Array, *, u: Array | None = None, v: Array | None = None, twist: str = "zero") -> NurbsSurface:
+def bicubic_approximant(
+    points: Array, *, u: Array | None = None, v: Array | None = None, twist: str = "zero"
+) -> NurbsSurface:
     """The C1 bicubic B-spline surface through a grid of points.
 
     Parameters
@@ -93,4 +95,8 @@ def _bessel(points: Array, x_u: Array, x_v: Array, xi: Array, eta: Array) -> Arr
     return np.swapaxes(_slopes(np.swapaxes(x_u, 0, 1), eta), 0, 1)
 
 
-TWISTS: dict[str, Callable[[Array, Array, Array, Array, Array], Array]] = {"zero": _zero, "adini": _adini, "bessel": _bessel}
+TWISTS: dict[str, Callable[[Array, Array, Array, Array, Array], Array]] = {
+    "zero": _zero,
+    "adini": _adini,
+    "bessel": _bessel,
+}

@@ -41,7 +41,9 @@ def cad_grid(assembly: Assembly) -> tuple[StructuredGrid | None, tuple[str, ...]
 
 def _edge_lengths(topology: Topology) -> Array:
     """(e,) chord lengths over 17 samples: enough to choose a number of nodes."""
-    return np.array([np.linalg.norm(np.diff(c(np.linspace(*c.domain, 17)), axis=0), axis=1).sum() for c in topology.curves])
+    return np.array(
+        [np.linalg.norm(np.diff(c(np.linspace(*c.domain, 17)), axis=0), axis=1).sum() for c in topology.curves]
+    )
 
 
 def _matching_intervals(topology: Topology, faces: list[int], lengths: Array, diagonal: float) -> IntArray:
@@ -49,9 +51,7 @@ def _matching_intervals(topology: Topology, faces: list[int], lengths: Array, di
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
 
-    pairs = [
-        (topology.loops[f][0][k].edge, topology.loops[f][0][k + 2].edge) for f in faces for k in (0, 1)
-    ]
+    pairs = [(topology.loops[f][0][k].edge, topology.loops[f][0][k + 2].edge) for f in faces for k in (0, 1)]
     i, j = np.array(pairs).T
     count = len(topology.curves)
     chains, label = connected_components(coo_matrix((np.ones(len(i)), (i, j)), shape=(count, count)), directed=False)

@@ -38,7 +38,9 @@ class _Outcome:
     reason: str
 
 
-def repair_cad(model: Assembly, tolerance: Tolerance, *, openings: str, diagnosis: Diagnosis, progress: Progress) -> Repaired:
+def repair_cad(
+    model: Assembly, tolerance: Tolerance, *, openings: str, diagnosis: Diagnosis, progress: Progress
+) -> Repaired:
     """Keep the faces of a CAD model and sew them where only round-off separates them.
 
     A model with gaps, crossing faces or invalid faces is refused; `scope="all"` resurfaces its tessellation instead.
@@ -52,19 +54,27 @@ def repair_cad(model: Assembly, tolerance: Tolerance, *, openings: str, diagnosi
     problems = tuple(_problem(d) for d in after.defects if d.severity == "error" and d.kind not in LEFT)
     if openings == "close":
         problems += tuple(
-            _problem(d, "closing openings of CAD faces is not possible yet; --scope all closes them on the tessellation")
+            _problem(
+                d, "closing openings of CAD faces is not possible yet; --scope all closes them on the tessellation"
+            )
             for d in after.defects
             if d.kind == "opening"
         )
     ledger = _ledger(model, outcome, diagnosis, after)
     body, deviation = _triangulated(outcome.assembly, tolerance), None
     if problems:
-        return Repaired(Verdict.REFUSED, (), (), body, ledger, None, 0.0, problems, Assembly((), model.unit, model.source))
+        return Repaired(
+            Verdict.REFUSED, (), (), body, ledger, None, 0.0, problems, Assembly((), model.unit, model.source)
+        )
     progress("measuring seams", 0.8)
     seams = _seams(outcome.assembly, tolerance)
     grid, without = cad_grid(outcome.assembly)
     if without and grid is not None:
-        ledger += (LedgerEntry("faces without a grid block", Rung.KEEP, without, "they are not four-sided", count=len(without)),)
+        ledger += (
+            LedgerEntry(
+                "faces without a grid block", Rung.KEEP, without, "they are not four-sided", count=len(without)
+            ),
+        )
     deviation = two_sided(model.triangulation, body, tolerance.fit)
     verdict = Verdict.CLEAN if outcome.sewn is None else Verdict.REPAIRED
     rung = Rung.KEEP if outcome.sewn is None else Rung.WELD
@@ -72,8 +82,17 @@ def repair_cad(model: Assembly, tolerance: Tolerance, *, openings: str, diagnosi
         Face(p.name, (p.name,), rung, 0.0, 0.0, float(p.triangulation.areas.sum())) for p in outcome.assembly.parts
     )
     return Repaired(
-        verdict, faces, seams, body, ledger, deviation, 0.0, (), outcome.assembly, grid=grid,
-        figures=_figures(outcome.assembly, seams, grid is not None and len(grid.blocks) or 0, after),
+        verdict,
+        faces,
+        seams,
+        body,
+        ledger,
+        deviation,
+        0.0,
+        (),
+        outcome.assembly,
+        grid=grid,
+        figures=_figures(outcome.assembly, seams, (grid is not None and len(grid.blocks)) or 0, after),
     )
 
 
@@ -101,7 +120,9 @@ def _sewn(model: Assembly) -> _Outcome:
         if max(gaps, default=0.0) <= SEAM_SHARE * model.diagonal:
             reason = f"{free} free edges become {result.free_edges}; free edges by tolerance: {counts}"
             return _Outcome(result.assembly, result, reason)
-    return _Outcome(model, None, f"no tolerance up to {curve.tolerances[-1]:.3g} closes a seam whose surfaces meet; {counts}")
+    return _Outcome(
+        model, None, f"no tolerance up to {curve.tolerances[-1]:.3g} closes a seam whose surfaces meet; {counts}"
+    )
 
 
 def _problem(defect: Defect, message: str = "") -> Problem:
@@ -110,20 +131,35 @@ def _problem(defect: Defect, message: str = "") -> Problem:
 
 def _ledger(model: Assembly, outcome: _Outcome, before: Diagnosis, after: Diagnosis) -> tuple[LedgerEntry, ...]:
     area = float(sum(p.triangulation.areas.sum() for p in model.parts))
-    entries = [LedgerEntry("CAD faces kept", Rung.KEEP, (), "their surfaces are identical", count=len(model.parts), area=area)]
+    entries = [
+        LedgerEntry("CAD faces kept", Rung.KEEP, (), "their surfaces are identical", count=len(model.parts), area=area)
+    ]
     if outcome.sewn is not None:
         change = float(outcome.sewn.surface_change.max(initial=0.0))
         entries.append(
-            LedgerEntry("edges sewn", Rung.WELD, (), outcome.reason, count=_free_edges(model) - outcome.sewn.free_edges,
-                        tolerance=outcome.sewn.tolerance, largest_move=change)
+            LedgerEntry(
+                "edges sewn",
+                Rung.WELD,
+                (),
+                outcome.reason,
+                count=_free_edges(model) - outcome.sewn.free_edges,
+                tolerance=outcome.sewn.tolerance,
+                largest_move=change,
+            )
         )
     else:
         entries.append(LedgerEntry("edges left as they were", Rung.KEEP, (), outcome.reason, count=0))
     for defect in after.defects:
         if defect.kind in LEFT and defect.severity != "info":
             entries.append(
-                LedgerEntry(f"{defect.kind} left", Rung.KEEP, tuple(defect.parts), defect.message, count=int(defect.count),
-                            where=_point(defect.where))
+                LedgerEntry(
+                    f"{defect.kind} left",
+                    Rung.KEEP,
+                    tuple(defect.parts),
+                    defect.message,
+                    count=int(defect.count),
+                    where=_point(defect.where),
+                )
             )
     return tuple(entries)
 
@@ -145,7 +181,9 @@ def _seams(assembly: Assembly, tolerance: Tolerance) -> tuple[Seam, ...]:
     )
 
 
-def _figures(assembly: Assembly, seams: tuple[Seam, ...], blocks: int, after: Diagnosis) -> dict[str, float | int | str | bool]:
+def _figures(
+    assembly: Assembly, seams: tuple[Seam, ...], blocks: int, after: Diagnosis
+) -> dict[str, float | int | str | bool]:
     smooth = np.array([s.angle for s in seams if s.kind == "smooth"] or [0.0])
     free = _free_edges(assembly)
     return {
@@ -158,5 +196,3 @@ def _figures(assembly: Assembly, seams: tuple[Seam, ...], blocks: int, after: Di
         "largest smooth seam angle": float(smooth.max()),
         "median smooth seam angle": float(np.median(smooth)),
     }
-
-

@@ -64,8 +64,15 @@ def sample_area(triangulation: Triangulation, count: int, seed: int = 0) -> tupl
     return np.einsum("ij,ijk->ik", weight, triangulation.corners[triangle]), triangle
 
 
-def two_sided(before: Triangulation, after: Triangulation, tolerance: float, *, skip_before: BoolArray | None = None,
-              skip_after: BoolArray | None = None, before_tree: Tree | None = None) -> Deviation:
+def two_sided(
+    before: Triangulation,
+    after: Triangulation,
+    tolerance: float,
+    *,
+    skip_before: BoolArray | None = None,
+    skip_after: BoolArray | None = None,
+    before_tree: Tree | None = None,
+) -> Deviation:
     """Distances between two triangulations.
 
     Parameters
@@ -73,6 +80,7 @@ def two_sided(before: Triangulation, after: Triangulation, tolerance: float, *, 
     tolerance : the length coverage is counted against
     skip_before, skip_after : (m,) bool, triangles no distance is taken *from* (invented surface)
     """
+
     def one_way(source: Triangulation, skip: BoolArray | None, tree: Tree) -> Spread:
         kept = source if skip is None else source.take(~np.asarray(skip, dtype=bool))
         points, _ = sample_area(kept, SAMPLES)

@@ -17,7 +17,9 @@ from patchwright.repair.quad_layout import QuadLayout
 CURVE_SAMPLES = 65
 
 
-def layout_of(patches: QuadLayout | Sequence[Any], tolerance: Tolerance, *, sharp: Sequence[tuple[int, int]] = ()) -> QuadLayout:
+def layout_of(
+    patches: QuadLayout | Sequence[Any], tolerance: Tolerance, *, sharp: Sequence[tuple[int, int]] = ()
+) -> QuadLayout:
     """A quad layout from a list of patches.
 
     Parameters
@@ -67,7 +69,9 @@ def layout_of(patches: QuadLayout | Sequence[Any], tolerance: Tolerance, *, shar
     for edge, use in enumerate(uses):
         if len(use) > 2:
             where = paths[edge][len(paths[edge]) // 2]
-            raise GeometryError(f"{len(use)} patches ({', '.join(str(q + 1) for q in use)}) share the edge at {where.round(6).tolist()}")
+            raise GeometryError(
+                f"{len(use)} patches ({', '.join(str(q + 1) for q in use)}) share the edge at {where.round(6).tolist()}"
+            )
     creases = {frozenset(pair) for pair in sharp}
     return QuadLayout(
         vertices=vertices,
@@ -92,7 +96,9 @@ def _sides(patch: Any, number: int, tolerance: Tolerance) -> tuple[Array, Array,
         t = np.linspace(0.0, 1.0, CURVE_SAMPLES)[:, None]
         return (1 - t) * a + t * b, (1 - t) * b + t * c, (1 - t) * d + t * c, (1 - t) * a + t * d
     if len(patch) != 4:
-        raise ParameterError(f"patch {number + 1} needs four boundary curves or a (4, 3) array of corners, got {len(patch)} items")
+        raise ParameterError(
+            f"patch {number + 1} needs four boundary curves or a (4, 3) array of corners, got {len(patch)} items"
+        )
     lines = []
     for curve in patch:
         if isinstance(curve, NurbsCurve):

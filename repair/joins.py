@@ -176,7 +176,9 @@ class _Side:
     active: BoolArray
 
 
-def _follow(layout: QuadLayout, which: IntArray, nets: Array, cells: tuple[int, int], fields: Array, smooth: BoolArray) -> Array:
+def _follow(
+    layout: QuadLayout, which: IntArray, nets: Array, cells: tuple[int, int], fields: Array, smooth: BoolArray
+) -> Array:
     """Moved copies of nets (k, M + 3, N + 3, 3) of one size."""
     m, n = cells
     ring = -np.ones((m + 3, n + 3), dtype=np.int64)  # numbers of the inner control points next to the boundary

@@ -15,9 +15,17 @@ SCOPES = ("least", "all")
 OPENINGS = ("keep", "close")
 
 
-def repair(assembly: Assembly | Triangulation, *, scope: str = "least", layout: Any = "auto", openings: Literal["keep", "close"] = "keep",
-           tolerance: Tolerance | float | None = None, domain: None = None, diagnosis: Diagnosis | None = None,
-           progress: Progress | None = None) -> Repaired:
+def repair(
+    assembly: Assembly | Triangulation,
+    *,
+    scope: str = "least",
+    layout: Any = "auto",
+    openings: Literal["keep", "close"] = "keep",
+    tolerance: Tolerance | float | None = None,
+    domain: None = None,
+    diagnosis: Diagnosis | None = None,
+    progress: Progress | None = None,
+) -> Repaired:
     """Mend a model with the least change.
 
     Parameters
@@ -47,7 +55,9 @@ def repair(assembly: Assembly | Triangulation, *, scope: str = "least", layout: 
         raise ParameterError("domain must be None in this version")
     model = Assembly.of(assembly) if isinstance(assembly, Triangulation) else assembly
     if not any(len(part.triangulation) for part in model.parts):
-        raise ParameterError(f"{model.source or 'the assembly'} holds no triangles and no faces: there is nothing to repair")
+        raise ParameterError(
+            f"{model.source or 'the assembly'} holds no triangles and no faces: there is nothing to repair"
+        )
     limits = tolerance if isinstance(tolerance, Tolerance) else Tolerance.of(model, fit=tolerance)
     say = progress or (lambda label, share: None)
     if diagnosis is None:

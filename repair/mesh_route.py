@@ -12,8 +12,8 @@ from typing import Literal
 
 import numpy as np
 
-from patchwright.models.assembly import Assembly, Part
 from patchwright.models.arrays import Array, BoolArray
+from patchwright.models.assembly import Assembly, Part
 from patchwright.models.tolerance import Tolerance
 from patchwright.models.tree import Tree
 from patchwright.models.triangulation import Triangulation
@@ -35,8 +35,16 @@ TESSELLATION = 12  # intervals per patch side when the patches are measured or w
 GRID = 8  # intervals per patch side of the structured grid
 
 
-def repair_mesh(assembly: Assembly, tolerance: Tolerance, *, scope: str, layout: str | QuadLayout, openings: Literal["keep", "close"], clean: bool,
-                progress: Progress) -> Repaired:
+def repair_mesh(
+    assembly: Assembly,
+    tolerance: Tolerance,
+    *,
+    scope: str,
+    layout: str | QuadLayout,
+    openings: Literal["keep", "close"],
+    clean: bool,
+    progress: Progress,
+) -> Repaired:
     """Mend a triangulated assembly and fit patches to it.
 
     Parameters
@@ -67,17 +75,33 @@ def repair_mesh(assembly: Assembly, tolerance: Tolerance, *, scope: str, layout:
     changed = bool(mended.actions or mended.dropped)
     verdict = Verdict.INVENTED if invented > 0 else Verdict.CLEAN if clean and not changed else Verdict.REPAIRED
     parts = tuple(
-        Part(face.name, Triangulation(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64)), surface=surface, body="repaired")
+        Part(
+            face.name,
+            Triangulation(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64)),
+            surface=surface,
+            body="repaired",
+        )
         for face, surface in zip(faces, network.surfaces(), strict=True)
     )
     return Repaired(
-        verdict, faces, seams, triangulation, ledger, deviation, invented, (),
+        verdict,
+        faces,
+        seams,
+        triangulation,
+        ledger,
+        deviation,
+        invented,
+        (),
         Assembly(parts, unit=assembly.unit, source=assembly.source, topology=network.topology()),
-        grid=network.grid(GRID), network=network, figures=_figures(network, mended, seams, deviation),
+        grid=network.grid(GRID),
+        network=network,
+        figures=_figures(network, mended, seams, deviation),
     )
 
 
-def _fit(mended: Mended, tolerance: Tolerance, layout: str | QuadLayout, progress: Progress) -> tuple[PatchNetwork, Deviation, int]:
+def _fit(
+    mended: Mended, tolerance: Tolerance, layout: str | QuadLayout, progress: Progress
+) -> tuple[PatchNetwork, Deviation, int]:
     """Lay out and fit, with finer quads until the coverage holds; the best network is kept."""
     body = mended.triangulation
     invented = np.asarray(mended.origin == BRIDGED)
@@ -92,7 +116,12 @@ def _fit(mended: Mended, tolerance: Tolerance, layout: str | QuadLayout, progres
         progress("measuring coverage", 0.0)
         skip = network_invented(network, TESSELLATION)
         deviation = two_sided(
-            body, network.tessellate(TESSELLATION), tolerance.fit, skip_before=invented, skip_after=skip, before_tree=tree
+            body,
+            network.tessellate(TESSELLATION),
+            tolerance.fit,
+            skip_before=invented,
+            skip_after=skip,
+            before_tree=tree,
         )
         if best is None or deviation.coverage > best[1].coverage:
             best = network, deviation
@@ -124,8 +153,17 @@ def _faces(network: PatchNetwork, mended: Mended) -> tuple[Face, ...]:
     total = area.sum(axis=(1, 2))
     share = (area * network.invented).sum(axis=(1, 2)) / np.where(total > 0, total, 1.0)
     return tuple(
-        Face(f"{names[tag] or 'patch'}-{i + 1}", (names[tag],), Rung.BRIDGE if s == 1.0 else Rung.RESURFACE, float(d), float(s), float(t))
-        for i, (tag, s, d, t) in enumerate(zip(network.layout.tags.tolist(), share, network.deviation, total, strict=True))
+        Face(
+            f"{names[tag] or 'patch'}-{i + 1}",
+            (names[tag],),
+            Rung.BRIDGE if s == 1.0 else Rung.RESURFACE,
+            float(d),
+            float(s),
+            float(t),
+        )
+        for i, (tag, s, d, t) in enumerate(
+            zip(network.layout.tags.tolist(), share, network.deviation, total, strict=True)
+        )
     )
 
 
@@ -144,18 +182,32 @@ def _mending_ledger(assembly: Assembly, mended: Mended) -> tuple[LedgerEntry, ..
         ):
             which = own & (mended.origin == origin)
             if which.any():
-                entries.append(LedgerEntry(words, rung, (name,), "", count=int(which.sum()), area=float(areas[which].sum())))
+                entries.append(
+                    LedgerEntry(words, rung, (name,), "", count=int(which.sum()), area=float(areas[which].sum()))
+                )
     for action in mended.actions:
         entries.append(
             LedgerEntry(
-                action.kind, Rung(action.rung), (), action.reason, count=int(action.count), tolerance=float(action.tolerance),
-                largest_move=float(action.largest_move), area=float(action.area), where=_point(action.where),
+                action.kind,
+                Rung(action.rung),
+                (),
+                action.reason,
+                count=int(action.count),
+                tolerance=float(action.tolerance),
+                largest_move=float(action.largest_move),
+                area=float(action.area),
+                where=_point(action.where),
             )
         )
     for piece in mended.dropped:
         entries.append(
             LedgerEntry(
-                piece.what, Rung.DROP, tuple(piece.parts), piece.why, count=len(piece.triangles), area=float(piece.area),
+                piece.what,
+                Rung.DROP,
+                tuple(piece.parts),
+                piece.why,
+                count=len(piece.triangles),
+                area=float(piece.area),
                 where=_point(piece.where),
             )
         )
@@ -174,18 +226,29 @@ def _resolved(tolerance: Tolerance, body: Triangulation) -> tuple[Tolerance, flo
     return replace(tolerance, fit=min(height, WIDEST * tolerance.fit)), height
 
 
-def _fitting_entry(network: PatchNetwork, mended: Mended, tolerance: Tolerance, tries: int, resolution: float) -> LedgerEntry:
+def _fitting_entry(
+    network: PatchNetwork, mended: Mended, tolerance: Tolerance, tries: int, resolution: float
+) -> LedgerEntry:
     worst = float(np.nanmax(network.deviation))
     over = int((network.deviation > tolerance.fit).sum())
     reason = (
         f"bicubic patches over {len(network)} quads, layout {tries}; {over} stray farther than the fit tolerance somewhere; "
         f"the input's facets are {resolution:.3g} high"
     )
-    return LedgerEntry("patches fitted", Rung.RESURFACE, mended.triangulation.tag_names, reason, count=len(network),
-                       tolerance=tolerance.fit, largest_move=worst)
+    return LedgerEntry(
+        "patches fitted",
+        Rung.RESURFACE,
+        mended.triangulation.tag_names,
+        reason,
+        count=len(network),
+        tolerance=tolerance.fit,
+        largest_move=worst,
+    )
 
 
-def _figures(network: PatchNetwork, mended: Mended, seams: Sequence[Seam], deviation: Deviation) -> dict[str, float | int | str | bool]:
+def _figures(
+    network: PatchNetwork, mended: Mended, seams: Sequence[Seam], deviation: Deviation
+) -> dict[str, float | int | str | bool]:
     """The numbers of the report's first table."""
     smooth = np.array([s.angle for s in seams if s.kind == "smooth"] or [0.0])
     return {
@@ -202,6 +265,17 @@ def _figures(network: PatchNetwork, mended: Mended, seams: Sequence[Seam], devia
     }
 
 
-def _refused(assembly: Assembly, mended: Mended, ledger: tuple[LedgerEntry, ...], problems: tuple[Problem, ...]) -> Repaired:
-    return Repaired(Verdict.REFUSED, (), (), mended.triangulation, ledger, None, 0.0, problems,
-                    Assembly((), unit=assembly.unit, source=assembly.source))
+def _refused(
+    assembly: Assembly, mended: Mended, ledger: tuple[LedgerEntry, ...], problems: tuple[Problem, ...]
+) -> Repaired:
+    return Repaired(
+        Verdict.REFUSED,
+        (),
+        (),
+        mended.triangulation,
+        ledger,
+        None,
+        0.0,
+        problems,
+        Assembly((), unit=assembly.unit, source=assembly.source),
+    )

@@ -66,7 +66,12 @@ class PatchNetwork:
             for backward in (False, True):
                 lines[k, backward] = NurbsCurve(1, _UNIT, ends[::-1] if backward else ends)
         loops = tuple(
-            (tuple(EdgeUse(int(e), bool(r), lines[k, bool(r)]) for k, (e, r) in enumerate(zip(quad, turned, strict=True))),)
+            (
+                tuple(
+                    EdgeUse(int(e), bool(r), lines[k, bool(r)])
+                    for k, (e, r) in enumerate(zip(quad, turned, strict=True))
+                ),
+            )
             for quad, turned in zip(layout.quad_edges, layout.edge_reversed, strict=True)
         )
         return Topology(layout.vertices, tuple(curves), layout.edges, loops)
@@ -77,7 +82,9 @@ class PatchNetwork:
         mark = self.invented[:, _nearest_cell(intervals)][:, :, _nearest_cell(intervals)]
         names = tuple(f"patch-{i + 1}" for i in range(len(self)))
         return StructuredGrid(
-            tuple(np.ascontiguousarray(p[:, :, None]) for p in points), names, tuple(m[:, :, None].astype(np.int64) for m in mark)
+            tuple(np.ascontiguousarray(p[:, :, None]) for p in points),
+            names,
+            tuple(m[:, :, None].astype(np.int64) for m in mark),
         )
 
     def points(self, intervals: int) -> Array:

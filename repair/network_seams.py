@@ -33,7 +33,14 @@ def measure(network: PatchNetwork) -> tuple[Seam, ...]:
         kind = "free" if len(use) < 2 else ("sharp" if layout.sharp[number] else "smooth")
         x, y, z = middle[number].tolist()
         seams.append(
-            Seam(tuple(q for q, _ in use), float(gap[number]), float(angle[number]), kind, float(length[number]), (x, y, z))
+            Seam(
+                tuple(q for q, _ in use),
+                float(gap[number]),
+                float(angle[number]),
+                kind,
+                float(length[number]),
+                (x, y, z),
+            )
         )
     return tuple(seams)
 

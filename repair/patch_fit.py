@@ -53,8 +53,14 @@ class FittedGroup:
     status: tuple[FillStatus, ...]
 
 
-def fit_group(rows: tuple[Array, Array, Array, Array], cells: tuple[int, int], target: Target, *, method: str = "smooth",
-              noise: float = 0.0) -> FittedGroup:
+def fit_group(
+    rows: tuple[Array, Array, Array, Array],
+    cells: tuple[int, int],
+    target: Target,
+    *,
+    method: str = "smooth",
+    noise: float = 0.0,
+) -> FittedGroup:
     """Fit the patches whose boundary control rows (south, north, west, east) are given."""
     south, north, west, east = rows
     m, n = samples_for(cells[0]), samples_for(cells[1])

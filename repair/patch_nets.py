@@ -57,7 +57,9 @@ class PatchNets:
         """(m, count, count, 3) a derivative of every patch at count x count equidistant parameters."""
         out = np.empty((len(self), count, count, 3))
         for (m, n), which, nets in self.groups():
-            out[which] = evaluate(nets, uniform_collocation(m, count, derivative[0]), uniform_collocation(n, count, derivative[1]))
+            out[which] = evaluate(
+                nets, uniform_collocation(m, count, derivative[0]), uniform_collocation(n, count, derivative[1])
+            )
         return out
 
 
@@ -66,7 +68,9 @@ def evaluate(nets: Array, basis_u: Array, basis_v: Array) -> Array:
     return np.asarray(np.matmul(basis_v, np.einsum("ai,kijd->kajd", basis_u, nets, optimize=True)))
 
 
-def sides(layout: QuadLayout, edges: EdgeCurves, which: IntArray, cells: tuple[int, int]) -> tuple[Array, Array, Array, Array]:
+def sides(
+    layout: QuadLayout, edges: EdgeCurves, which: IntArray, cells: tuple[int, int]
+) -> tuple[Array, Array, Array, Array]:
     """Control rows (south, north, west, east) of patches of one size, each (k, cells + 3, 3) and run along +u or +v.
 
     Corner k of a quad is at (u, v) = (0, 0), (1, 0), (1, 1), (0, 1); edge k joins corners k and k + 1.

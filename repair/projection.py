@@ -39,8 +39,15 @@ class Projected:
         return self.triangle >= 0
 
 
-def project(points: Array, normals: Array, distance: Array, tree: Tree, *, region: IntArray | None = None,
-            allowed: IntArray | None = None) -> Projected:
+def project(
+    points: Array,
+    normals: Array,
+    distance: Array,
+    tree: Tree,
+    *,
+    region: IntArray | None = None,
+    allowed: IntArray | None = None,
+) -> Projected:
     """Project points along their normals, both ways, onto the tree's triangles.
 
     Parameters
@@ -73,8 +80,16 @@ def project(points: Array, normals: Array, distance: Array, tree: Tree, *, regio
     return Projected(out, t, triangle, barycentric)
 
 
-def _choose(offsets: IntArray, t: Array, triangle: IntArray, facing: Array, normals: Array, distance: Array,
-            region: IntArray | None, allowed: IntArray | None) -> IntArray:
+def _choose(
+    offsets: IntArray,
+    t: Array,
+    triangle: IntArray,
+    facing: Array,
+    normals: Array,
+    distance: Array,
+    region: IntArray | None,
+    allowed: IntArray | None,
+) -> IntArray:
     """(n,) index of each segment's admissible hit nearest its middle, -1 for none."""
     count = np.diff(offsets)
     n = len(count)

@@ -48,8 +48,15 @@ class _State:
     invented: BoolArray  # (m, 8, 8)
 
 
-def resurface(layout: QuadLayout, target: Target, tolerance: Tolerance, *, method: str = "smooth", noise: float = 0.0,
-              progress: Progress | None = None) -> PatchNetwork:
+def resurface(
+    layout: QuadLayout,
+    target: Target,
+    tolerance: Tolerance,
+    *,
+    method: str = "smooth",
+    noise: float = 0.0,
+    progress: Progress | None = None,
+) -> PatchNetwork:
     """Fit the network.
 
     Parameters
@@ -159,14 +166,24 @@ def _edge_errors(layout: QuadLayout, edges: EdgeCurves, target: Target) -> Array
     return out
 
 
-def _fit(layout: QuadLayout, edges: EdgeCurves, cells: IntArray, which: IntArray, old: _State | None, target: Target,
-         method: str, noise: float) -> _State:
+def _fit(
+    layout: QuadLayout,
+    edges: EdgeCurves,
+    cells: IntArray,
+    which: IntArray,
+    old: _State | None,
+    target: Target,
+    method: str,
+    noise: float,
+) -> _State:
     """Fit the patches `which`; the others are taken from `old`."""
     groups: list[tuple[IntArray, Array]] = []
     invented = np.zeros((len(layout.quads), 8, 8), dtype=bool) if old is None else old.invented.copy()
     for m, n in np.unique(cells[which], axis=0):
         some = which[(cells[which] == (m, n)).all(axis=1)]
-        fitted = fit_group(sides(layout, edges, some, (int(m), int(n))), (int(m), int(n)), target, method=method, noise=noise)
+        fitted = fit_group(
+            sides(layout, edges, some, (int(m), int(n))), (int(m), int(n)), target, method=method, noise=noise
+        )
         groups.append((some, fitted.nets))
         invented[some] = _mark(~fitted.data)
     if old is not None:
@@ -202,7 +219,9 @@ def _patch_errors(layout: QuadLayout, nets: PatchNets, which: IntArray, target: 
         some = which[(nets.cells[which] == (m, n)).all(axis=1)]
         nu, nv = samples_for(int(m)), samples_for(int(n))
         us, vs = np.linspace(0.0, 1.0, 2 * nu + 1), np.linspace(0.0, 1.0, 2 * nv + 1)
-        points = evaluate(nets.nets(some), uniform_collocation(int(m), 2 * nu + 1), uniform_collocation(int(n), 2 * nv + 1))
+        points = evaluate(
+            nets.nets(some), uniform_collocation(int(m), 2 * nu + 1), uniform_collocation(int(n), 2 * nv + 1)
+        )
         closest = target.tree.closest(points.reshape(-1, 3))
         distance = closest.distance.copy()
         distance[target.invented[closest.triangle]] = 0.0

@@ -5,6 +5,7 @@ from __future__ import annotations
 from types import SimpleNamespace
 
 import numpy as np
+
 from patchwright.repair.quad_layout import QuadLayout
 
 
@@ -37,7 +38,9 @@ class SphereTarget:
         offsets = np.concatenate([[0], np.cumsum(np.bincount(ray, minlength=len(a)))])
         self.triangulation = SimpleNamespace(normals=points / self.radius)
         self.inside_slit = self._mark(points)
-        return SimpleNamespace(offsets=offsets, t=t[ray, k], triangle=np.arange(len(ray)), barycentric=np.full((len(ray), 3), 1 / 3))
+        return SimpleNamespace(
+            offsets=offsets, t=t[ray, k], triangle=np.arange(len(ray)), barycentric=np.full((len(ray), 3), 1 / 3)
+        )
 
 
 class Marks:

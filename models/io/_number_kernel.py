@@ -14,9 +14,9 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 from numba import njit
+
 from patchwright.models.arrays import Array, IntArray
 from patchwright.models.io.opening import Bytes
-
 
 GOOD, SLOW, BAD = 0, 1, 2
 Words: TypeAlias = npt.NDArray[np.uint64]

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
+
 from patchwright.models.arrays import Array, IntArray
 from patchwright.models.io.opening import Bytes
-
 
 WHOLE, CUT_OFF, NOT_COUNT = 0, 1, 2
 

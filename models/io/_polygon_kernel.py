@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 from numba import njit
+
 from patchwright.models.arrays import Array, IntArray
 
 

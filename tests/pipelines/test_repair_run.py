@@ -6,6 +6,7 @@ import json
 
 import numpy as np
 import pytest
+
 from patchwright.models import Tolerance, Triangulation
 from patchwright.models.io import read, write
 from patchwright.models.samples import damage, missing_triangles, sphere, unmerged

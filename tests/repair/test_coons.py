@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+
 from patchwright.models.errors import GeometryError
 from patchwright.repair.coons import check_corners, coons_grid, offset_distance, offset_normals
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+
 from patchwright.models import Triangulation
 from patchwright.models.samples import cube
 from patchwright.repair.faceting import faceting

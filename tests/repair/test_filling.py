@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+
 from patchwright.models.errors import ParameterError
 from patchwright.repair.filling import METHODS, FillStatus, fill
 

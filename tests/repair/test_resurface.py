@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from quad_shapes import Marks, SphereTarget, sphere_layout
+
 from patchwright.models.tolerance import Tolerance
 from patchwright.repair.network_seams import measure
 from patchwright.repair.patch_fit import Target
 from patchwright.repair.resurface import resurface
-from quad_shapes import Marks, SphereTarget, sphere_layout
 
 
 def network_of(n, fit, radius=1.0, slit=0.0):
