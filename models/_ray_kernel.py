@@ -9,20 +9,33 @@ from patchwright.models._exact_kernel import determinant, difference_tail
 from patchwright.models._tree_kernel import STACK, Boxes, Index
 from patchwright.models.arrays import Array, IntArray
 
-HUGE = 1e300  # stands for 1 / 0: its product with zero is zero
-SLACK = 4e-15  # on the parameters of box planes: more than their rounding
+HUGE = 1e37  # stands for 1 / 0: its product with zero is zero, also in single precision
+NONE = np.float32(np.inf)
+ZERO = np.float32(0.0)
+SHRINK = np.float32(1.0 - 5e-7)  # of a box's entry: more than eight single-precision roundings
+WIDEN = 1.0 + 1e-6  # of the best distance, likewise
 ROUNDING = 3e-15  # of an edge function against the lengths in it: 24 units in the last place
 
 
 @njit(cache=True, nogil=True)
-def ray_frame(direction: Array) -> tuple[int, int, int, float, float, float]:
+def radius_of(boxes: Boxes) -> float:
+    """The radius about the centre that holds the tree."""
+    size = 0.0
+    for k in range(12):
+        if abs(boxes[0, k]) < NONE:
+            size = max(size, abs(boxes[0, k]))
+    return np.sqrt(3.0) * size
+
+
+@njit(cache=True, nogil=True)
+def ray_frame(direction: Array) -> tuple[int, int, int, float, float]:
     """Axes permuted so that the longest comes last, and the shear that turns the direction into it (Woop 2013)."""
     kz = 0
     for k in range(1, 3):
         if abs(direction[k]) > abs(direction[kz]):
             kz = k
     kx, ky = (kz + 1) % 3, (kz + 2) % 3
-    return kx, ky, kz, direction[kx] / direction[kz], direction[ky] / direction[kz], 1.0 / direction[kz]
+    return kx, ky, kz, direction[kx] / direction[kz], direction[ky] / direction[kz]
 
 
 @njit(cache=True, nogil=True)
@@ -43,6 +56,32 @@ def exact_edge(corners: Array, i: int, p: int, q: int, origins: Array, r: int, f
 
 
 @njit(cache=True, nogil=True)
+def settle(
+    corners: Array,
+    i: int,
+    origins: Array,
+    r: int,
+    frame: Array,
+    u: float,
+    v: float,
+    w: float,
+    az: float,
+    bz: float,
+    cz: float,
+    error: float,
+) -> tuple[float, float, float, float]:
+    """`ray_triangle` where an edge function is within its rounding `error` of zero: those are evaluated exactly."""
+    u = u if abs(u) > error else exact_edge(corners, i, 2, 1, origins, r, frame)
+    v = v if abs(v) > error else exact_edge(corners, i, 0, 2, origins, r, frame)
+    w = w if abs(w) > error else exact_edge(corners, i, 1, 0, origins, r, frame)
+    total = u + v + w
+    if total == 0.0 or (min(min(u, v), w) < 0.0 and max(max(u, v), w) > 0.0):
+        return np.nan, 0.0, 0.0, 0.0
+    u, v, w = u / total, v / total, w / total
+    return u * az + v * bz + w * cz, u, v, w
+
+
+@njit(cache=True, nogil=True, forceinline=True)
 def ray_triangle(
     corners: Array, i: int, origins: Array, r: int, frame: Array, kx: int, ky: int, kz: int, sx: float, sy: float
 ) -> tuple[float, float, float, float]:
@@ -63,35 +102,40 @@ def ray_triangle(
     if min(min(u, v), w) < -error and max(max(u, v), w) > error:
         return np.nan, 0.0, 0.0, 0.0
     if min(min(abs(u), abs(v)), abs(w)) <= error:
-        u = u if abs(u) > error else exact_edge(corners, i, 2, 1, origins, r, frame)
-        v = v if abs(v) > error else exact_edge(corners, i, 0, 2, origins, r, frame)
-        w = w if abs(w) > error else exact_edge(corners, i, 1, 0, origins, r, frame)
-        if min(min(u, v), w) < 0.0 and max(max(u, v), w) > 0.0:
-            return np.nan, 0.0, 0.0, 0.0
+        return settle(corners, i, origins, r, frame, u, v, w, az, bz, cz, error)
     total = u + v + w
-    if total == 0.0:
-        return np.nan, 0.0, 0.0, 0.0
     u, v, w = u / total, v / total, w / total
     return u * az + v * bz + w * cz, u, v, w
 
 
 @njit(cache=True, nogil=True)
 def inverse(x: float) -> float:
-    """1 / x, finite."""
-    return 1.0 / x if abs(x) > 1.0 / HUGE else HUGE
+    """1 / x in single precision, finite."""
+    return np.float32(1.0 / x if abs(x) * HUGE > 1.0 else HUGE)
 
 
 @njit(cache=True, nogil=True)
+def approach(px: float, py: float, pz: float, dx: float, dy: float, dz: float, radius: float) -> float:
+    """How far to go along a ray that starts far off before single precision will do; inf if it misses `radius`."""
+    square = px * px + py * py + pz * pz
+    if square <= 16.0 * radius * radius:
+        return 0.0
+    ahead = (np.sqrt(square) - 2.0 * radius) / np.sqrt(dx * dx + dy * dy + dz * dz)
+    x, y, z = px + ahead * dx, py + ahead * dy, pz + ahead * dz
+    return ahead if x * x + y * y + z * z <= 16.1 * radius * radius else np.inf
+
+
+@njit(cache=True, nogil=True, forceinline=True)
 def entry(
     boxes: Boxes, node: int, at: int, px: float, py: float, pz: float, ix: float, iy: float, iz: float, best: float
 ) -> float:
-    """Parameter at which a ray enters a box, from below; inf if it misses it or comes later than `best`."""
+    """Where a ray enters a box, from below, in single precision; inf if it misses it or comes later than `best`."""
     x0, x1 = (boxes[node, at] - px) * ix, (boxes[node, at + 3] - px) * ix
     y0, y1 = (boxes[node, at + 1] - py) * iy, (boxes[node, at + 4] - py) * iy
     z0, z1 = (boxes[node, at + 2] - pz) * iz, (boxes[node, at + 5] - pz) * iz
-    near = max(max(min(x0, x1), min(y0, y1)), max(min(z0, z1), 0.0)) * (1.0 - SLACK)
+    near = max(max(min(x0, x1), min(y0, y1)), max(min(z0, z1), ZERO)) * SHRINK
     far = min(min(max(x0, x1), max(y0, y1)), min(max(z0, z1), best))
-    return near if near <= far else np.inf
+    return near if near <= far else NONE
 
 
 @njit(cache=True, nogil=True)
@@ -109,36 +153,45 @@ def first_hits(
     triangle: IntArray,
     barycentric: Array,
 ) -> None:
-    """Nearest hit of the rays `order`; `reach` and `distance` are lengths, whatever the length of the directions."""
+    """Nearest hit of the rays `order`; `reach` and `distance` are lengths, whatever the length of the directions.
+
+    Within, ways are measured along the direction's longest axis.
+    """
     frame = np.zeros((2, 3))
-    direction = frame[0]
     stack = np.empty(STACK, np.int32)
-    enter = np.empty(STACK)
+    enter = np.empty(STACK, np.float32)
+    radius = radius_of(boxes)
     for r in order:
-        dx, dy, dz = directions[r, 0], directions[r, 1], directions[r, 2]
-        longest = max(max(abs(dx), abs(dy)), abs(dz))
-        if not 1e-100 < longest < 1e100:
-            dx, dy, dz = dx / longest, dy / longest, dz / longest
-        direction[0], direction[1], direction[2] = dx, dy, dz
-        length = np.sqrt(dx * dx + dy * dy + dz * dz)
-        kx, ky, kz, sx, sy, sz = ray_frame(direction)
-        px, py, pz = origins[r, 0] - center[0], origins[r, 1] - center[1], origins[r, 2] - center[2]
-        ix, iy, iz = inverse(direction[0]), inverse(direction[1]), inverse(direction[2])
+        for k in range(3):
+            frame[0, k] = directions[r, k]
+        kx, ky, kz, sx, sy = ray_frame(frame[0])
+        length = np.sqrt(sx * sx + sy * sy + 1.0)
+        longest = abs(frame[0, kz])
+        sign = 1.0 if frame[0, kz] > 0.0 else -1.0
         best = reach[r % reach.shape[0]] / length
         found = -1
         wa, wb, wc = 0.0, 0.0, 0.0
-        stack[0] = 0
-        enter[0] = 0.0
-        top = 1
+        dx, dy, dz = frame[0, 0] / longest, frame[0, 1] / longest, frame[0, 2] / longest
+        x, y, z = origins[r, 0] - center[0], origins[r, 1] - center[1], origins[r, 2] - center[2]
+        ahead = approach(x, y, z, dx, dy, dz, radius)
+        top = 0
+        if ahead < np.inf:
+            x, y, z = x + ahead * dx, y + ahead * dy, z + ahead * dz
+            stack[0] = 0
+            enter[0] = ZERO
+            top = 1
+        px, py, pz = np.float32(x), np.float32(y), np.float32(z)
+        ix, iy, iz = inverse(dx), inverse(dy), inverse(dz)
+        limit = np.float32((best - ahead) * WIDEN + 1e-15 * ahead)
         while top:
             top -= 1
-            if enter[top] > best:
+            if enter[top] > limit:
                 continue
             node = stack[top]
             while node >= 0:
-                left = entry(boxes, node, 0, px, py, pz, ix, iy, iz, best)
-                right = entry(boxes, node, 6, px, py, pz, ix, iy, iz, best)
-                if min(left, right) == np.inf:
+                left = entry(boxes, node, 0, px, py, pz, ix, iy, iz, limit)
+                right = entry(boxes, node, 6, px, py, pz, ix, iy, iz, limit)
+                if min(left, right) == NONE:
                     break
                 if left <= right:
                     stack[top] = child[node, 1]
@@ -148,14 +201,15 @@ def first_hits(
                     stack[top] = child[node, 0]
                     enter[top] = left
                     node = child[node, 1]
-                top += max(left, right) < np.inf
+                top += max(left, right) < NONE
             if node < 0:
                 code = -(np.int64(node) + 1)
                 for i in range(code >> 3, (code >> 3) + (code & 7)):
                     t, u, v, w = ray_triangle(corners, i, origins, r, frame, kx, ky, kz, sx, sy)
-                    t *= sz
+                    t *= sign
                     if t >= 0.0 and (t < best or (t == best and (found < 0 or index[i] < found))):
                         best, found, wa, wb, wc = t, np.int64(index[i]), u, v, w
+                        limit = np.float32((best - ahead) * WIDEN + 1e-15 * ahead)
         triangle[r] = found
         distance[r] = best * length if found >= 0 else np.inf
         barycentric[r, 0], barycentric[r, 1], barycentric[r, 2] = wa, wb, wc
@@ -171,19 +225,24 @@ def all_hits(
     hits = np.empty((max(16, 2 * n), 5))
     stack = np.empty(STACK, np.int32)
     frame = np.zeros((2, 3))
-    direction = frame[0]
+    radius = radius_of(boxes)
     filled = 0
     for r in range(n):
-        length = 0.0
         for k in range(3):
-            direction[k] = end[r, k] - start[r, k]
-            frame[1, k] = difference_tail(end[r, k], start[r, k], direction[k])
-            length = max(length, abs(direction[k]))
-        if length == 0.0:
+            frame[0, k] = end[r, k] - start[r, k]
+            frame[1, k] = difference_tail(end[r, k], start[r, k], frame[0, k])
+        kx, ky, kz, sx, sy = ray_frame(frame[0])
+        longest = abs(frame[0, kz])
+        if longest == 0.0:
             continue
-        kx, ky, kz, sx, sy, sz = ray_frame(direction)
-        px, py, pz = start[r, 0] - center[0], start[r, 1] - center[1], start[r, 2] - center[2]
-        ix, iy, iz = inverse(direction[0]), inverse(direction[1]), inverse(direction[2])
+        dx, dy, dz = frame[0, 0] / longest, frame[0, 1] / longest, frame[0, 2] / longest
+        x, y, z = start[r, 0] - center[0], start[r, 1] - center[1], start[r, 2] - center[2]
+        ahead = approach(x, y, z, dx, dy, dz, radius)
+        if ahead == np.inf:
+            continue
+        px, py, pz = np.float32(x + ahead * dx), np.float32(y + ahead * dy), np.float32(z + ahead * dz)
+        ix, iy, iz = inverse(dx), inverse(dy), inverse(dz)
+        limit = np.float32((longest - ahead) * WIDEN + 1e-15 * ahead)
         stack[0] = 0
         top = 1
         while top:
@@ -191,14 +250,14 @@ def all_hits(
             node = stack[top]
             if node >= 0:
                 for half in range(2):
-                    if entry(boxes, node, 6 * half, px, py, pz, ix, iy, iz, 1.0) < np.inf:
+                    if entry(boxes, node, 6 * half, px, py, pz, ix, iy, iz, limit) < NONE:
                         stack[top] = child[node, half]
                         top += 1
                 continue
             code = -(np.int64(node) + 1)
             for i in range(code >> 3, (code >> 3) + (code & 7)):
                 t, u, v, w = ray_triangle(corners, i, start, r, frame, kx, ky, kz, sx, sy)
-                t *= sz
+                t /= frame[0, kz]
                 if not 0.0 <= t <= 1.0:
                     continue
                 if filled == hits.shape[0]:

@@ -24,6 +24,19 @@ STACK = 160
 
 
 @njit(cache=True, nogil=True)
+def bounds(vertices: Array, triangles: IntArray) -> tuple[Array, Array]:
+    """Lowest and highest coordinates of the triangles' corners; zeros without triangles."""
+    low, high = np.zeros(3), np.zeros(3)
+    for t in range(triangles.shape[0]):
+        for j in range(3):
+            for k in range(3):
+                x = vertices[triangles[t, j], k]
+                low[k] = x if t + j == 0 else min(low[k], x)
+                high[k] = x if t + j == 0 else max(high[k], x)
+    return low, high
+
+
+@njit(cache=True, nogil=True)
 def primitive_boxes(vertices: Array, triangles: IntArray, center: Array, pad: float) -> Boxes:
     """(m, 6) boxes of the triangles about `center`, padded."""
     m = triangles.shape[0]

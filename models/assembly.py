@@ -26,8 +26,8 @@ class Part:
     name : the part's own name ("" when the file gives none)
     triangulation : the piece itself for a mesh, the tessellation (with uv) of a CAD face
     surface : the true surface of a CAD face, None for a mesh
-    trims : loops of (u, v) curves that bound the face on its surface, the outer loop first; None means its natural bounds
-    body : name of the solid or shell a CAD face belongs to, "" otherwise
+    trims : loops of (u, v) curves that bound the face on its surface, the outer first; None means its natural bounds
+    body : solid or shell a CAD face belongs to, "" otherwise
     native : the CAD kernel's own face, opaque; kept so that an untouched face is written back unchanged
     """
 

@@ -1,4 +1,4 @@
-"""The error tree: every failure a caller may want to tell apart, with a sentence that says what, where and what to do."""
+"""The error tree: every failure a caller may want to tell apart, its text saying what, where and what to do."""
 
 from __future__ import annotations
 

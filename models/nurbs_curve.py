@@ -122,7 +122,7 @@ class NurbsCurve:
         ParameterError : a parameter outside the domain by more than round-off, or a negative order.
         """
         t = knot_tools.inside(self.domain, u)
-        return self._jet(t.ravel(), nu)[-1].reshape(*t.shape, self.dimension)
+        return np.asarray(self._jet(t.ravel(), nu)[-1].reshape(*t.shape, self.dimension))
 
     def derivatives(self, u: npt.ArrayLike, order: int) -> Array:
         """(order + 1, ..., d) the derivatives of orders 0..order at parameters of any shape."""

@@ -106,10 +106,10 @@ class Tree:
 
         if len(triangulation) >= 2**28:
             raise ParameterError(f"a tree holds at most {2**28 - 1} triangles, got {len(triangulation)}")
-        low, high = triangulation.bounds
+        low, high = kernel.bounds(triangulation.vertices, triangulation.triangles)
         center = 0.5 * low + 0.5 * high
         half = float(np.max(high - low)) / 2.0
-        pad = max(half * 2.0**-22, 8.0 * float(np.finfo(np.float64).eps) * float(np.abs(center).max()), 1e-37)
+        pad = max(half * 2.0**-20, 8.0 * float(np.finfo(np.float64).eps) * float(np.abs(center).max()), 1e-37)
         boxes = kernel.primitive_boxes(triangulation.vertices, triangulation.triangles, center, pad)
         nodes, child, order = kernel.build(boxes)
         corners = kernel.gather(triangulation.vertices, triangulation.triangles, order)

@@ -47,14 +47,14 @@ class Triangulation:
             triangles = triangles.reshape(0, 3).astype(np.int64)
         if vertices.ndim != 2 or vertices.shape[1] != 3 or triangles.ndim != 2 or triangles.shape[1] != 3:
             raise ParameterError(
-                f"a triangulation needs vertices (n, 3) and triangles (m, 3), got {vertices.shape} and {triangles.shape}"
+                f"vertices must be (n, 3) and triangles (m, 3), got {vertices.shape} and {triangles.shape}"
             )
         if not np.isfinite(vertices).all():
             bad = int(np.flatnonzero(~np.isfinite(vertices).all(axis=1))[0])
             raise ParameterError(f"vertex {bad} has a coordinate that is not finite: {vertices[bad].tolist()}")
         if len(triangles) and (triangles.min() < 0 or triangles.max() >= len(vertices)):
             raise ParameterError(
-                f"triangle indices run from {triangles.min()} to {triangles.max()}, but there are {len(vertices)} vertices"
+                f"triangle indices run from {triangles.min()} to {triangles.max()}, but {len(vertices)} vertices exist"
             )
         put(self, "vertices", frozen(self.vertices if vertices.base is None else vertices, np.float64))
         put(self, "triangles", frozen(triangles, np.int64))
@@ -87,14 +87,14 @@ class Triangulation:
     @property
     def areas(self) -> Array:
         """(m,) areas."""
-        return np.linalg.norm(self.area_vectors, axis=1)
+        return np.asarray(np.linalg.norm(self.area_vectors, axis=1))
 
     @property
     def normals(self) -> Array:
         """(m, 3) unit normals; zero for a triangle without area."""
         vectors = self.area_vectors
         length = np.linalg.norm(vectors, axis=1, keepdims=True)
-        return np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0.0)
+        return np.asarray(np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0.0))
 
     @property
     def volume(self) -> float:

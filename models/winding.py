@@ -30,7 +30,7 @@ def winding_number(
     points : (n, 3), model length unit
     tree : the triangulation's tree, if it is there already
     accuracy : aimed-at error, not a bound: nodes are taken whole from (accuracy / 1.5)^(-1/3) radii away on, as
-        the error was measured to stay below 1.5 / radii^3; 0 sums every triangle. Cost per point: log n times accuracy^(-2/3)
+        the error was measured to stay below 1.5 / radii^3; 0 sums every triangle. Cost: log n times accuracy^(-2/3)
 
     Returns
     -------

@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 import sys
 import warnings
-from enum import Enum
+from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -26,7 +26,7 @@ INTERRUPTED = "interrupted; nothing half-written was left"
 
 app = typer.Typer(
     name="patchwright",
-    help="Gets dirty CAD ready for CFD surface grids: mends STL and STEP with the least change and says what it changed.",
+    help="Gets dirty CAD ready for CFD surface grids: mends STL and STEP with the least change, and says what changed.",
     add_completion=False,
     no_args_is_help=True,
     pretty_exceptions_enable=False,
@@ -35,14 +35,14 @@ app = typer.Typer(
 )
 
 
-class Scope(str, Enum):
+class Scope(StrEnum):
     """How much a repair may touch."""
 
     least = "least"
     all = "all"
 
 
-class Openings(str, Enum):
+class Openings(StrEnum):
     """What becomes of planned openings."""
 
     keep = "keep"
@@ -99,8 +99,9 @@ def repair(
     from patchwright.pipelines.recipe import repair_recipe
     from patchwright.pipelines.run import run
 
+    terminal = _warmed(quiet)
     recipe = repair_recipe(file, output, scope=scope.value, openings=openings.value, tolerance=tolerance)
-    _finish(run(recipe, terminal=_terminal(quiet)), json)
+    _finish(run(recipe, terminal=terminal), json)
 
 
 @app.command()
@@ -113,7 +114,7 @@ def demo(
     """Make a dirty aircraft, repair it, and compare the result with the known truth."""
     from patchwright.pipelines.demo import run_demo
 
-    _finish(run_demo(output, seed=seed, terminal=_terminal(quiet)), json)
+    _finish(run_demo(output, seed=seed, terminal=_warmed(quiet)), json)
 
 
 @app.command("run")
@@ -125,7 +126,7 @@ def run_(
     """Run a recipe: a TOML file with source, folder and stages."""
     from patchwright.pipelines.run import run
 
-    _finish(run(recipe, terminal=_terminal(quiet)), json)
+    _finish(run(recipe, terminal=_warmed(quiet)), json)
 
 
 @app.command()
@@ -144,9 +145,8 @@ def convert(
         assembly = read(source)
         report("writing", 0.5)
         write(target, assembly)
-    _say(
-        f"{source} -> {target}: {len(assembly.parts)} parts, {sum(len(p.triangulation) for p in assembly.parts)} triangles"
-    )
+    triangles = sum(len(part.triangulation) for part in assembly.parts)
+    _say(f"{source} -> {target}: {len(assembly.parts)} parts, {triangles} triangles")
 
 
 def _version(wanted: bool) -> None:
@@ -171,6 +171,15 @@ def _terminal(quiet: bool) -> Terminal:
 
     terminal = Terminal(quiet=quiet)
     warnings.showwarning = lambda message, *rest, **more: terminal.line(f"  warning: {message}")
+    return terminal
+
+
+def _warmed(quiet: bool) -> Terminal:
+    """The terminal, with the kernels' compilation under way where this machine has never done it."""
+    from patchwright.pipelines.warm import start
+
+    terminal = _terminal(quiet)
+    start(terminal)
     return terminal
 
 

@@ -26,11 +26,11 @@ def run(recipe: Recipe | Path | str, *, assembly: Assembly | None = None, termin
 
     Returns
     -------
-    Study : every stage's artefact; what was written is in `.files`.
+    Study : every stage's artefact; `.files` lists what was written.
 
     Raises
     ------
-    GeometryError : unreadable input, an option without meaning. A refused repair raises nothing: see `.repaired.verdict`.
+    GeometryError : unreadable input, an option without meaning. A refusal raises nothing: see `.repaired.verdict`.
     """
     plan = recipe if isinstance(recipe, Recipe) else load_recipe(Path(recipe))
     shown = terminal or Terminal(quiet=True)

@@ -56,7 +56,8 @@ def check_corners(south: Array, north: Array, west: Array, east: Array, toleranc
     corner, gap = max(gaps.items(), key=lambda item: item[1])
     if gap > tolerance:
         raise GeometryError(
-            f"the boundary curves miss each other at the {corner} corner by {gap:.3g}, more than the tolerance {tolerance:.3g}"
+            f"the boundary curves miss each other at the {corner} corner by {gap:.3g}, "
+            f"more than the tolerance {tolerance:.3g}"
         )
 
 

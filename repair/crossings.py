@@ -21,4 +21,4 @@ def crossing_pairs(triangulation: Triangulation, depth: float) -> IntArray:
     if len(triangulation) < 2:
         return np.zeros((0, 2), dtype=np.int64)
     pairs = np.ascontiguousarray(Tree.of(triangulation).pairs(), dtype=np.int64).reshape(-1, 2)
-    return pairs[crossing(pairs, triangulation.vertices, triangulation.triangles, depth)]
+    return np.asarray(pairs[crossing(pairs, triangulation.vertices, triangulation.triangles, depth)])

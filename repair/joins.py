@@ -27,7 +27,7 @@ CORNER_U, CORNER_V = np.array([0, 1, 1, 0]), np.array([0, 0, 1, 1])
 def corner_normals(nets: PatchNets) -> Array:
     """(m, 4, 3) unit normal of every patch at its corners, extrapolated from a tenth and a fifth of a cell inside.
 
-    At the corner itself the normal hangs on two edge tangents alone, which may be nearly parallel at an irregular vertex.
+    At the corner itself the normal hangs on two edge tangents, which may be nearly parallel at an irregular vertex.
     """
     out = np.empty((len(nets), 4, 3))
     for (m, n), which, group in nets.groups():
@@ -220,7 +220,7 @@ def _follow(
 
 
 def _side(own: int, slots: IntArray, border: Array, leg: Array, field: Array, active: BoolArray) -> _Side:
-    """The conditions along one side of `own` pieces, from its control row, the legs to the next row and the edge's field."""
+    """The conditions along a side of `own` pieces: from its control row, the legs to the next, and the edge's field."""
     from scipy.interpolate import CubicSpline
 
     sites = greville(own)[1:-1]

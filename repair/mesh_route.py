@@ -232,7 +232,7 @@ def _fitting_entry(
     worst = float(np.nanmax(network.deviation))
     over = int((network.deviation > tolerance.fit).sum())
     reason = (
-        f"bicubic patches over {len(network)} quads, layout {tries}; {over} stray farther than the fit tolerance somewhere; "
+        f"bicubic patches over {len(network)} quads, layout {tries}; {over} stray farther than the fit tolerance; "
         f"the input's facets are {resolution:.3g} high"
     )
     return LedgerEntry(

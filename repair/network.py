@@ -129,7 +129,7 @@ class PatchNetwork:
 
 
 def _put_sides(layout: QuadLayout, nodes: Any, inner: Any, corners: Any) -> None:
-    """Write shared values into the sides (edges' inner nodes, (e, count, ...)) and corners of (m, n, n, ...) `nodes`."""
+    """Write shared values into the sides (edges' inner nodes (e, count, ...)) and corners of `nodes` (m, n, n, ...)."""
     for k, (i, j) in enumerate(((slice(1, -1), 0), (-1, slice(1, -1)), (slice(1, -1), -1), (0, slice(1, -1)))):
         side = inner[layout.quad_edges[:, k]]
         backward = layout.edge_reversed[:, k] != (k >= 2)

@@ -74,7 +74,7 @@ def fit_group(
     hits = project(coons[inner], normal[inner], distance[inner], target.tree)
     known = hits.hit & ~target.invented[hits.triangle]
     offset = np.zeros(coons.shape[:3])
-    given: BoolArray = np.ones(coons.shape[:3], dtype=bool)
+    given = np.ones(coons.shape[:3], dtype=np.bool_)
     given[:, 1:-1, 1:-1] = False
     found = given.copy()  # the boundary curves are given, wherever they run
     found[inner] = known
@@ -82,7 +82,7 @@ def fit_group(
     data = found.copy()
     data[given] = ~target.invented[target.tree.closest(coons[given]).triangle]
     # no data under the whole patch: its guide is the bridging surface itself
-    bare = ~found[:, 1:-1, 1:-1].any(axis=(1, 2))
+    bare = np.asarray(~found[:, 1:-1, 1:-1].any(axis=(1, 2)))
     guided = inner & bare[:, None, None]
     guided[inner] &= hits.hit
     status = []

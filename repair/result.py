@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from enum import Enum
+from enum import StrEnum
 from typing import TYPE_CHECKING
 
 from patchwright.models.assembly import Assembly
@@ -19,7 +19,7 @@ Progress = Callable[[str, float], None]
 Point = tuple[float, float, float]
 
 
-class Verdict(str, Enum):
+class Verdict(StrEnum):
     """How a repair ended."""
 
     CLEAN = "clean"
@@ -28,7 +28,7 @@ class Verdict(str, Enum):
     REFUSED = "refused"
 
 
-class Rung(str, Enum):
+class Rung(StrEnum):
     """The rungs of the least-change ladder, from nothing to everything; "weld" is also sewing of round-off."""
 
     KEEP = "keep"

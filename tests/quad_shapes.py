@@ -10,7 +10,7 @@ from patchwright.repair.quad_layout import QuadLayout
 
 
 class SphereTarget:
-    """The unit sphere itself, answering like a `Tree` that numbers its triangles anew each time; optional slit |z - 0.3| < slit / 2."""
+    """A sphere answering like a `Tree` that numbers its triangles anew each time; a slit where |z - 0.3| < slit / 2."""
 
     def __init__(self, radius: float = 1.0, slit: float = 0.0) -> None:
         self.radius, self.slit = radius, slit

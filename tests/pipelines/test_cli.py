@@ -58,7 +58,8 @@ def bad_inputs(folder):
     text.write_text("dear reader,\nthis is a letter and no geometry\n" * 20)
     nan = folder / "nan.stl"
     nan.write_text(
-        "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 nan\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid a\n"
+        "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 nan\nvertex 1 0 0\nvertex 0 1 0\n"
+        "endloop\nendfacet\nendsolid a\n"
     )
     inf = folder / "inf.obj"
     inf.write_text("v 0 0 inf\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
