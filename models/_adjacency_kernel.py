@@ -1,4 +1,8 @@
-"""Kernels of `adjacency`: unique edges by a two-pass radix sort, connected components, ordered boundary chains."""
+"""Kernels of `adjacency`: unique edges by a two-pass radix sort, connected components, ordered boundary chains.
+
+Each public function makes the arrays and its kernel fills them: allocating inside would be typed and compiled too.
+"""
+# mypy: disable-error-code="untyped-decorator,no-any-return,no-untyped-def,no-untyped-call"
 
 from __future__ import annotations
 
@@ -8,80 +12,112 @@ from numba import njit
 from patchwright.models.arrays import BoolArray, IntArray
 
 
-@njit(cache=True, nogil=True)
 def unique_edges(triangles: IntArray, count: int) -> tuple[IntArray, IntArray, IntArray, IntArray, IntArray, BoolArray]:
     """Edges, triangle_edges, CSR offsets and triangles, neighbours, and which edges are run twice in one direction.
 
     Half-edges (lo, hi) are sorted by two stable counting passes (hi, then lo): linear in triangles and vertices,
     whatever the valences, and within an edge its triangles stay in rising order.
     """
-    m = triangles.shape[0]
-    total = 3 * m
-    start = np.zeros(count + 2, np.int64)  # start[v + 1] becomes the end of the bucket of v as the bucket fills
-    for t in range(m):
-        for k in range(3):
-            start[max(triangles[t, k], triangles[t, k - 2]) + 2] += 1
-    for v in range(count):
-        start[v + 2] += start[v + 1]
-    by_hi = np.empty(total, np.int64)  # twice the half-edge 3 t + k, plus one where it runs from hi to lo
-    lo_of = np.empty(total, np.int64)
-    for t in range(m):
-        for k in range(3):
-            a, b = triangles[t, k], triangles[t, k - 2]
-            at = start[max(a, b) + 1]
-            by_hi[at] = 2 * (3 * t + k) + (a > b)
-            lo_of[at] = min(a, b)
-            start[max(a, b) + 1] = at + 1
-    fill = np.zeros(count + 2, np.int64)
-    for i in range(total):
-        fill[lo_of[i] + 2] += 1
-    for v in range(count):
-        fill[v + 2] += fill[v + 1]
-    order = np.empty(total, np.int64)
-    hi_of = np.empty(total, np.int64)
-    for hi in range(count):
-        for i in range(start[hi], start[hi + 1]):
-            at = fill[lo_of[i] + 1]
-            order[at] = by_hi[i]
-            hi_of[at] = hi
-            fill[lo_of[i] + 1] = at + 1
-
-    edges = np.empty((total, 2), np.int64)
-    offsets = np.empty(total + 1, np.int64)
-    around = lo_of  # its old content is no longer needed
+    m = len(triangles)
+    around = np.empty(3 * m, np.int64)
+    edges = np.empty((3 * m, 2), np.int64)
+    offsets = np.empty(3 * m + 1, np.int64)
     triangle_edges = np.empty((m, 3), np.int64)
     neighbours = np.full((m, 3), -1, np.int64)
-    inconsistent = np.zeros(total, np.bool_)
-    e = 0
-    for lo in range(count):
-        i, end = fill[lo], fill[lo + 1]
-        while i < end:
-            first, hi = i, hi_of[i]
-            edges[e, 0], edges[e, 1] = lo, hi
-            offsets[e] = first
-            while i < end and hi_of[i] == hi:
-                h = order[i] >> 1
-                t = h // 3
-                around[i] = t
-                triangle_edges[t, h - 3 * t] = e
-                i += 1
-            if i == first + 2 and lo != hi:
-                g, h = order[first] >> 1, order[first + 1] >> 1
-                inconsistent[e] = (order[first] & 1) == (order[first + 1] & 1)
-                s, t = g // 3, h // 3
-                if s != t:  # a folded triangle (i, j, i) is not its own neighbour
-                    neighbours[s, g - 3 * s] = t
-                    neighbours[t, h - 3 * t] = s
-            e += 1
-    offsets[e] = total
+    inconsistent = np.zeros(3 * m, np.bool_)
+    e = _unique_edges(
+        triangles, count, np.zeros(count + 2, np.int64), np.zeros(count + 2, np.int64), np.empty((3, 3 * m), np.int64),
+        around, edges, offsets, triangle_edges, neighbours, inconsistent,
+    )  # fmt: skip
     return edges[:e].copy(), triangle_edges, offsets[: e + 1].copy(), around, neighbours, inconsistent[:e].copy()
 
 
 @njit(cache=True, nogil=True)
+def _unique_edges(
+    triangles: IntArray,
+    count: int,
+    start: IntArray,
+    fill: IntArray,
+    half_edges: IntArray,
+    around: IntArray,
+    edges: IntArray,
+    offsets: IntArray,
+    triangle_edges: IntArray,
+    neighbours: IntArray,
+    inconsistent: BoolArray,
+) -> int:
+    """The number of edges. `half_edges` rows: twice the half-edge 3 t + k, plus one where it runs from hi to lo, by
+    hi; the same by lo and hi; its hi. `start[v + 1]` becomes the end of the bucket of v as the bucket fills."""
+    m = triangles.shape[0]
+    total = 3 * m
+    for t in range(m):
+        for k in range(3):
+            a = triangles[t, k]
+            b = triangles[t, 0 if k == 2 else k + 1]
+            start[(b if a < b else a) + 2] += 1
+            fill[(a if a < b else b) + 2] += 1
+    for v in range(count):
+        start[v + 2] += start[v + 1]
+        fill[v + 2] += fill[v + 1]
+    for t in range(m):
+        for k in range(3):
+            a = triangles[t, k]
+            b = triangles[t, 0 if k == 2 else k + 1]
+            hi, lo, back = b, a, 0
+            if a > b:
+                hi, lo, back = a, b, 1
+            at = start[hi + 1]
+            half_edges[0, at] = 6 * t + 2 * k + back
+            around[at] = lo
+            start[hi + 1] = at + 1
+    for hi in range(count):
+        for i in range(start[hi], start[hi + 1]):
+            lo = around[i]
+            at = fill[lo + 1]
+            half_edges[1, at] = half_edges[0, i]
+            half_edges[2, at] = hi
+            fill[lo + 1] = at + 1
+    e = 0
+    for lo in range(count):
+        i = fill[lo]
+        end = fill[lo + 1]
+        while i < end:
+            first = i
+            hi = half_edges[2, i]
+            edges[e, 0] = lo
+            edges[e, 1] = hi
+            offsets[e] = first
+            t = 0
+            k = 0
+            back = 0
+            while i < end and half_edges[2, i] == hi:
+                other, corner, way = t, k, back
+                h = half_edges[1, i]
+                back = h & 1
+                t = h // 6
+                k = (h >> 1) - 3 * t
+                around[i] = t
+                triangle_edges[t, k] = e
+                i += 1
+            if i == first + 2 and lo != hi:
+                inconsistent[e] = way == back
+                if other != t:  # a folded triangle (i, j, i) is not its own neighbour
+                    neighbours[other, corner] = t
+                    neighbours[t, k] = other
+            e += 1
+    offsets[e] = total
+    return e
+
+
 def component_labels(offsets: IntArray, around: IntArray) -> IntArray:
     """(m,) component of each triangle, counted in the order of the components' first triangles (union-find)."""
-    m = around.shape[0] // 3
-    parent = np.arange(m)
+    parent = np.arange(len(around) // 3)
+    _component_labels(offsets, around, parent)
+    return parent
+
+
+@njit(cache=True, nogil=True)
+def _component_labels(offsets: IntArray, around: IntArray, parent: IntArray) -> None:
     for e in range(offsets.shape[0] - 1):
         a = around[offsets[e]]
         while parent[a] != a:
@@ -98,16 +134,14 @@ def component_labels(offsets: IntArray, around: IntArray) -> IntArray:
                 parent[a] = b
                 a = b
     found = 0
-    for t in range(m):  # a root is the lowest triangle of its component
+    for t in range(parent.shape[0]):  # a root is the lowest triangle of its component
         if parent[t] == t:
             parent[t] = found
             found += 1
         else:
             parent[t] = parent[parent[t]]
-    return parent
 
 
-@njit(cache=True, nogil=True)
 def chains(tail: IntArray, head: IntArray, count: int) -> tuple[IntArray, IntArray, BoolArray]:
     """Directed edges tail → head joined to simple chains: CSR offsets, vertices, and whether each chain is closed.
 
@@ -115,33 +149,41 @@ def chains(tail: IntArray, head: IntArray, count: int) -> tuple[IntArray, IntArr
     inconsistent there); whenever it meets itself the loop is cut off. Walks begin at the vertices of odd degree, so
     that what is left over after them closes.
     """
-    n = tail.shape[0]
-    out_start = np.zeros(count + 1, np.int64)
-    in_start = np.zeros(count + 1, np.int64)
-    for i in range(n):
-        out_start[tail[i] + 1] += 1
-        in_start[head[i] + 1] += 1
-    for v in range(count):
-        out_start[v + 1] += out_start[v]
-        in_start[v + 1] += in_start[v]
-    out_edge = np.empty(n, np.int64)
-    in_edge = np.empty(n, np.int64)
-    out_next = out_start[:-1].copy()
-    in_next = in_start[:-1].copy()
-    for i in range(n):
-        out_edge[out_next[tail[i]]] = i
-        out_next[tail[i]] += 1
-        in_edge[in_next[head[i]]] = i
-        in_next[head[i]] += 1
-    out_next[:] = out_start[:-1]
-    in_next[:] = in_start[:-1]
-    out_left, in_left = np.diff(out_start), np.diff(in_start)  # edges not walked yet
-    used = np.zeros(n, np.bool_)
-    place = np.full(count, -1, np.int64)  # of a vertex in the path being walked
-    path = np.empty(n + 1, np.int64)
+    n = len(tail)
+    start = np.zeros((2, count + 1), np.int64)
+    incident = np.empty((2, n), np.int64)  # edges out of each vertex, edges into each vertex
+    for row, end in enumerate((tail, head)):
+        np.cumsum(np.bincount(end, minlength=count), out=start[row, 1:])
+        incident[row] = np.argsort(end, kind="stable")
     vertices = np.empty(2 * n, np.int64)
     offsets = np.zeros(n + 1, np.int64)
     closed = np.zeros(n, np.bool_)
+    done = _chains(
+        np.ascontiguousarray(tail), np.ascontiguousarray(head), start, incident, start[:, :-1].copy(),
+        np.diff(start, axis=1), np.zeros(n, np.bool_), np.full(count, -1, np.int64), np.empty(n + 1, np.int64),
+        vertices, offsets, closed,
+    )  # fmt: skip
+    return offsets[: done + 1].copy(), vertices[: offsets[done]].copy(), closed[:done].copy()
+
+
+@njit(cache=True, nogil=True)
+def _chains(
+    tail: IntArray,
+    head: IntArray,
+    start_of: IntArray,
+    incident: IntArray,
+    following: IntArray,
+    left: IntArray,
+    used: BoolArray,
+    place: IntArray,
+    path: IntArray,
+    vertices: IntArray,
+    offsets: IntArray,
+    closed: BoolArray,
+) -> int:
+    """The number of chains. Row 0 of `start_of`, `incident`, `following`, `left` is about edges out, row 1 about edges
+    in: CSR of the edges at each vertex, the next to look at, how many not walked yet. `place` of a vertex in `path`."""
+    n = tail.shape[0]
     done = 0
     filled = 0
     for sweep in range(3):
@@ -149,29 +191,31 @@ def chains(tail: IntArray, head: IntArray, count: int) -> tuple[IntArray, IntArr
             if sweep == 2 and (start >= n or used[start]):
                 continue
             seed = tail[start] if start < n else head[start - n]
-            outward, inward = out_left[seed], in_left[seed]
-            if sweep < 2 and ((outward + inward) % 2 == 0 or (sweep == 0 and outward < inward)):
+            outward = left[0, seed]
+            inward = left[1, seed]
+            if sweep < 2 and ((outward + inward) & 1 == 0 or (sweep == 0 and outward < inward)):
                 continue
             length = 1
             path[0] = seed
             place[seed] = 0
             while True:
                 v = path[length - 1]
-                while out_next[v] < out_start[v + 1] and used[out_edge[out_next[v]]]:
-                    out_next[v] += 1
-                while in_next[v] < in_start[v + 1] and used[in_edge[in_next[v]]]:
-                    in_next[v] += 1
-                if out_next[v] < out_start[v + 1]:
-                    edge = out_edge[out_next[v]]
-                    w = head[edge]
-                elif in_next[v] < in_start[v + 1]:
-                    edge = in_edge[in_next[v]]
-                    w = tail[edge]
-                else:
+                edge = -1
+                w = v
+                for side in range(2):
+                    at = following[side, v]
+                    end = start_of[side, v + 1]
+                    while at < end and used[incident[side, at]]:
+                        at += 1
+                    following[side, v] = at
+                    if edge < 0 and at < end:
+                        edge = incident[side, at]
+                        w = tail[edge] if side else head[edge]
+                if edge < 0:
                     break
                 used[edge] = True
-                out_left[tail[edge]] -= 1
-                in_left[head[edge]] -= 1
+                left[0, tail[edge]] -= 1
+                left[1, head[edge]] -= 1
                 if place[w] < 0:
                     place[w] = length
                     path[length] = w
@@ -194,4 +238,4 @@ def chains(tail: IntArray, head: IntArray, count: int) -> tuple[IntArray, IntArr
                 offsets[done] = filled
             for j in range(length):
                 place[path[j]] = -1
-    return offsets[: done + 1].copy(), vertices[:filled].copy(), closed[:done].copy()
+    return done

@@ -9,6 +9,7 @@ from patchwright.models._exact_kernel import determinant, difference_tail
 from patchwright.models._tree_kernel import STACK, Boxes, Index
 from patchwright.models.arrays import Array, IntArray
 
+BLOCK = 64  # rays copied at a time: scattered reads overlap
 HUGE = 1e37  # stands for 1 / 0: its product with zero is zero, also in single precision
 NONE = np.float32(np.inf)
 ZERO = np.float32(0.0)
@@ -56,29 +57,29 @@ def exact_edge(corners: Array, i: int, p: int, q: int, origins: Array, r: int, f
 
 
 @njit(cache=True, nogil=True)
+def exact_side(corners: Array, i: int, points: Array, r: int) -> float:
+    """det of row i's corners seen from point r: its sign is exact, zero in the triangle's plane."""
+    rows = np.empty((3, 3))
+    tails = np.empty((3, 3))
+    for j in range(3):
+        for k in range(3):
+            rows[j, k] = corners[i, 3 * j + k] - points[r, k]
+            tails[j, k] = difference_tail(corners[i, 3 * j + k], points[r, k], rows[j, k])
+    return determinant(rows, tails)
+
+
+@njit(cache=True, nogil=True)
 def settle(
-    corners: Array,
-    i: int,
-    origins: Array,
-    r: int,
-    frame: Array,
-    u: float,
-    v: float,
-    w: float,
-    az: float,
-    bz: float,
-    cz: float,
-    error: float,
+    corners: Array, i: int, origins: Array, r: int, frame: Array, u: float, v: float, w: float, error: float
 ) -> tuple[float, float, float, float]:
-    """`ray_triangle` where an edge function is within its rounding `error` of zero: those are evaluated exactly."""
+    """`ray_triangle` in exact arithmetic: edge functions within their rounding `error` of zero, and the depth."""
     u = u if abs(u) > error else exact_edge(corners, i, 2, 1, origins, r, frame)
     v = v if abs(v) > error else exact_edge(corners, i, 0, 2, origins, r, frame)
     w = w if abs(w) > error else exact_edge(corners, i, 1, 0, origins, r, frame)
     total = u + v + w
     if total == 0.0 or (min(min(u, v), w) < 0.0 and max(max(u, v), w) > 0.0):
         return np.nan, 0.0, 0.0, 0.0
-    u, v, w = u / total, v / total, w / total
-    return u * az + v * bz + w * cz, u, v, w
+    return -exact_side(corners, i, origins, r) / total, u / total, v / total, w / total
 
 
 @njit(cache=True, nogil=True, forceinline=True)
@@ -102,10 +103,12 @@ def ray_triangle(
     if min(min(u, v), w) < -error and max(max(u, v), w) > error:
         return np.nan, 0.0, 0.0, 0.0
     if min(min(abs(u), abs(v)), abs(w)) <= error:
-        return settle(corners, i, origins, r, frame, u, v, w, az, bz, cz, error)
+        return settle(corners, i, origins, r, frame, u, v, w, error)
     total = u + v + w
-    u, v, w = u / total, v / total, w / total
-    return u * az + v * bz + w * cz, u, v, w
+    depth = (u * az + v * bz + w * cz) / total
+    if abs(depth) <= ROUNDING * far:
+        return settle(corners, i, origins, r, frame, u, v, w, error)
+    return depth, u / total, v / total, w / total
 
 
 @njit(cache=True, nogil=True)
@@ -161,10 +164,19 @@ def first_hits(
     stack = np.empty(STACK, np.int32)
     enter = np.empty(STACK, np.float32)
     radius = radius_of(boxes)
-    for r in order:
+    starts = np.empty((BLOCK, 3))
+    ways = np.empty((BLOCK, 3))
+    for n in range(order.shape[0]):
+        row = n & (BLOCK - 1)
+        if row == 0:
+            for j in range(min(BLOCK, order.shape[0] - n)):
+                for k in range(3):
+                    starts[j, k], ways[j, k] = origins[order[n + j], k], directions[order[n + j], k]
+        r = order[n]
         for k in range(3):
-            frame[0, k] = directions[r, k]
+            frame[0, k] = ways[row, k]
         kx, ky, kz, sx, sy = ray_frame(frame[0])
+        kx, ky, kz = kx & 3, ky & 3, kz & 3  # tells the compiler that they are not negative
         length = np.sqrt(sx * sx + sy * sy + 1.0)
         longest = abs(frame[0, kz])
         sign = 1.0 if frame[0, kz] > 0.0 else -1.0
@@ -172,7 +184,7 @@ def first_hits(
         found = -1
         wa, wb, wc = 0.0, 0.0, 0.0
         dx, dy, dz = frame[0, 0] / longest, frame[0, 1] / longest, frame[0, 2] / longest
-        x, y, z = origins[r, 0] - center[0], origins[r, 1] - center[1], origins[r, 2] - center[2]
+        x, y, z = starts[row, 0] - center[0], starts[row, 1] - center[1], starts[row, 2] - center[2]
         ahead = approach(x, y, z, dx, dy, dz, radius)
         top = 0
         if ahead < np.inf:
@@ -203,9 +215,9 @@ def first_hits(
                     node = child[node, 1]
                 top += max(left, right) < NONE
             if node < 0:
-                code = -(np.int64(node) + 1)
+                code = -(np.int64(node) + 1) & 0x7FFFFFFF
                 for i in range(code >> 3, (code >> 3) + (code & 7)):
-                    t, u, v, w = ray_triangle(corners, i, origins, r, frame, kx, ky, kz, sx, sy)
+                    t, u, v, w = ray_triangle(corners, i, starts, row, frame, kx, ky, kz, sx, sy)
                     t *= sign
                     if t >= 0.0 and (t < best or (t == best and (found < 0 or index[i] < found))):
                         best, found, wa, wb, wc = t, np.int64(index[i]), u, v, w
@@ -258,6 +270,8 @@ def all_hits(
             for i in range(code >> 3, (code >> 3) + (code & 7)):
                 t, u, v, w = ray_triangle(corners, i, start, r, frame, kx, ky, kz, sx, sy)
                 t /= frame[0, kz]
+                if 1.0 < t < 1.0 + ROUNDING and exact_side(corners, i, end, r) == 0.0:
+                    t = 1.0
                 if not 0.0 <= t <= 1.0:
                     continue
                 if filled == hits.shape[0]:

@@ -186,20 +186,17 @@ def build(boxes: Boxes) -> tuple[Boxes, Index, Index]:
             stack[top, 3] = depth + 1
             top += 1
         nodes += 1
-    return node_boxes[:nodes].copy(), child[:nodes].copy(), order
+    return node_boxes[:nodes], child[:nodes], order
 
 
 @njit(cache=True, nogil=True)
-def gather(vertices: Array, triangles: IntArray, order: Index) -> Array:
-    """(m, 9) corners of the triangles in the order of the leaves."""
-    m = order.shape[0]
-    corners = np.empty((m, 9))
-    for i in range(m):
+def gather(vertices: Array, triangles: IntArray, order: Index, corners: Array) -> None:
+    """Fill `corners` (m, 9) with the triangles' corners in the order of the leaves."""
+    for i in range(order.shape[0]):
         for j in range(3):
             v = triangles[order[i], j]
             for k in range(3):
                 corners[i, 3 * j + k] = vertices[v, k]
-    return corners
 
 
 @njit(cache=True, nogil=True)
@@ -217,7 +214,7 @@ def extent(points: Array, low: Array) -> float:
 
 @njit(cache=True, nogil=True)
 def morton_order(points: Array, otherwise: Array, least: float) -> IntArray:
-    """(n,) an order in which successive points are near: 30-bit Morton codes, sorted by three radix passes.
+    """(n,) an order in which successive points are near: 21-bit Morton codes, sorted by two radix passes.
 
     Where all `points` lie within `least`, the order is that of the points `otherwise`.
     """
@@ -227,7 +224,7 @@ def morton_order(points: Array, otherwise: Array, least: float) -> IntArray:
     if size <= least:
         points = otherwise
         size = extent(points, low)
-    scale = 1023.0 / size if 0.0 < size < np.inf else 0.0
+    scale = 127.0 / size if 0.0 < size < np.inf else 0.0
     code = np.zeros(n, np.int64)
     for i in range(n):
         for k in range(3):
@@ -238,15 +235,15 @@ def morton_order(points: Array, otherwise: Array, least: float) -> IntArray:
             code[i] |= ((x | (x << 2)) & 0x09249249) << k
     order = np.arange(n)
     other = np.empty(n, np.int64)
-    start = np.empty(1025, np.int64)
-    for digit in range(3):
+    start = np.empty(2049, np.int64)
+    for digit in range(2):
         start[:] = 0
         for i in range(n):
-            start[((code[i] >> (10 * digit)) & 1023) + 1] += 1
-        for b in range(1024):
+            start[((code[i] >> (11 * digit)) & 2047) + 1] += 1
+        for b in range(2048):
             start[b + 1] += start[b]
         for i in range(n):
-            b = (code[order[i]] >> (10 * digit)) & 1023
+            b = (code[order[i]] >> (11 * digit)) & 2047
             other[start[b]] = order[i]
             start[b] += 1
         order, other = other, order

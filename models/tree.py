@@ -112,7 +112,9 @@ class Tree:
         pad = max(half * 2.0**-20, 8.0 * float(np.finfo(np.float64).eps) * float(np.abs(center).max()), 1e-37)
         boxes = kernel.primitive_boxes(triangulation.vertices, triangulation.triangles, center, pad)
         nodes, child, order = kernel.build(boxes)
-        corners = kernel.gather(triangulation.vertices, triangulation.triangles, order)
+        nodes, child = nodes.copy(), child.copy()  # numpy's large arrays may get huge pages, those of kernels do not
+        corners = np.empty((len(order), 9))
+        kernel.gather(triangulation.vertices, triangulation.triangles, order, corners)
         for array in (center, nodes, child, corners, order):
             array.flags.writeable = False
         return cls(triangulation, center, nodes, child, corners, order)

@@ -1,6 +1,6 @@
 """The command line: `patchwright check | repair | convert | run | demo`.
 
-Only here do errors become sentences and exit codes: 0 done, 1 defects found or refused, 2 bad usage or input,
+Only here do errors become sentences and exit codes: 0 done, 1 defects found, refused or not converged, 2 bad usage or input,
 3 internal failure. Heavy packages are imported inside the commands, so that `--help` answers at once.
 """
 
@@ -192,8 +192,9 @@ def _finish(study: Study, json: bool) -> None:
         _say_json(study_json(study))
     else:
         _say("\n".join(study_lines(study)))
-    refused = study.repaired is not None and study.repaired.verdict is Verdict.REFUSED
-    raise typer.Exit(FOUND if refused else DONE)
+    repaired = study.repaired
+    short = repaired is not None and not (repaired.verdict is not Verdict.REFUSED and repaired.converged)
+    raise typer.Exit(FOUND if short else DONE)
 
 
 _stdout = 1  # the descriptor results go to; `main` keeps the real one and sends native chatter to stderr

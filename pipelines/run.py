@@ -41,8 +41,11 @@ def run(recipe: Recipe | Path | str, *, assembly: Assembly | None = None, termin
         with shown.stage("read") as report:
             report("reading", 0.0)
             assembly = read(plan.source, unit=plan.unit)
-    if not any(len(part.triangulation) for part in assembly.parts):
+    count = sum(len(part.triangulation) for part in assembly.parts)
+    if count == 0:
         raise ParameterError(f"{plan.source}: holds no faces and no triangles; there is nothing to work on")
+    if count == 1 and not assembly.is_cad:
+        raise ParameterError(f"{plan.source}: holds a single triangle; a surface to repair needs more than that")
     study = Study(
         str(plan.source),
         plan.folder,

@@ -11,7 +11,7 @@ from patchwright.models.arrays import Array
 from patchwright.models.tree import Tree
 from patchwright.repair.deviation import sample_area
 from patchwright.repair.diagnosis import Diagnosis
-from patchwright.repair.mesh_route import TESSELLATION, network_invented
+from patchwright.repair.mesh_route import network_invented
 from patchwright.repair.result import Repaired
 
 if TYPE_CHECKING:
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from patchwright.models.samples.truth import Truth
 
 SAMPLES = 40_000
+TRUE_CHORD = 1e-5  # of the diagonal: how far the tessellation compared with the truth may stray from the patches
 MISSING = ("gap", "opening", "open-edge")  # kinds under which missing surface may be reported
 
 
@@ -26,8 +27,9 @@ def against_truth(repaired: Repaired, truth: Truth, diagonal: float) -> dict[str
     """Distances in shares of the diagonal, both ways, invented surface left out, and the volume's relative error."""
     if repaired.network is None:
         return {}
-    body = repaired.network.tessellate(TESSELLATION)
-    invented = network_invented(repaired.network, TESSELLATION)
+    intervals = repaired.network.intervals_within(TRUE_CHORD * diagonal)
+    body = repaired.network.tessellate(intervals)
+    invented = network_invented(repaired.network, intervals)
     points, _ = sample_area(body.take(~invented), SAMPLES)
     out: dict[str, Any] = {}
     _spread(out, "result to truth", truth.distance(points) / diagonal)

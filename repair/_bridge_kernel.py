@@ -1,10 +1,14 @@
 """Kernels of bridging: the cheapest triangulation of one loop and the cheapest strip between two."""
+# mypy: disable-error-code="untyped-decorator,no-any-return,no-untyped-def,no-untyped-call"
 
 from __future__ import annotations
 
 import numpy as np
+import numpy.typing as npt
 from numba import njit
 from patchwright.models.arrays import Array, BoolArray, IntArray
+
+Bytes = npt.NDArray[np.uint8]
 
 SPREAD = 0.05  # weight of the squared length of inner edges: between equal areas the compact triangles win
 
@@ -14,14 +18,14 @@ def _normal(p: Array, q: Array, r: Array, out: Array) -> float:
     """Unit normal of a triangle into `out`, returns its area."""
     ax, ay, az = q[0] - p[0], q[1] - p[1], q[2] - p[2]
     bx, by, bz = r[0] - p[0], r[1] - p[1], r[2] - p[2]
-    out[0] = ay * bz - az * by
-    out[1] = az * bx - ax * bz
-    out[2] = ax * by - ay * bx
-    size = np.sqrt(out[0] ** 2 + out[1] ** 2 + out[2] ** 2)
-    if size > 0.0:
-        out[0] /= size
-        out[1] /= size
-        out[2] /= size
+    nx = ay * bz - az * by
+    ny = az * bx - ax * bz
+    nz = ax * by - ay * bx
+    size = np.sqrt(nx * nx + ny * ny + nz * nz)
+    scale = size if size > 0.0 else 1.0
+    out[0] = nx / scale
+    out[1] = ny / scale
+    out[2] = nz / scale
     return 0.5 * size
 
 
@@ -38,7 +42,6 @@ def _turn(n: Array, k: Array) -> float:
     return 1.0 - (n[0] * k[0] + n[1] * k[1] + n[2] * k[2])
 
 
-@njit(cache=True)
 def fill_loop(points: Array, normals: Array, forbidden: BoolArray) -> IntArray:
     """Triangulate a loop at least cost by dynamic programming over its sub-loops; empty when there is no way.
 
@@ -47,13 +50,29 @@ def fill_loop(points: Array, normals: Array, forbidden: BoolArray) -> IntArray:
     length times the turn of the normals across it. Returns (n - 2, 3) indices, running against the rim.
     """
     n = len(points)
-    cost = np.full((n, n), np.inf)
-    split = np.full((n, n), -1, dtype=np.int64)
+    cost, split = np.full((n, n), np.inf), np.full((n, n), -1, dtype=np.int64)
     facing = np.zeros((n, n, 3))
-    mine = np.zeros(3)
-    for i in range(n - 1):
-        cost[i, i + 1] = 0.0
-        facing[i, i + 1] = normals[i]
+    at = np.arange(n - 1)
+    cost[at, at + 1] = 0.0
+    facing[at, at + 1] = normals[:-1]
+    triangles = np.empty((n - 2, 3), dtype=np.int64)
+    _fill_loop(points, normals, forbidden, cost, split, facing, np.zeros(3), np.empty((n, 2), dtype=np.int64), triangles)
+    return triangles if np.isfinite(cost[0, n - 1]) else np.empty((0, 3), dtype=np.int64)
+
+
+@njit(cache=True)
+def _fill_loop(
+    points: Array,
+    normals: Array,
+    forbidden: BoolArray,
+    cost: Array,
+    split: IntArray,
+    facing: Array,
+    mine: Array,
+    stack: IntArray,
+    triangles: IntArray,
+) -> None:
+    n = len(points)
     for span in range(2, n):
         for i in range(n - span):
             j = i + span
@@ -65,8 +84,7 @@ def fill_loop(points: Array, normals: Array, forbidden: BoolArray) -> IntArray:
                 below = cost[i, k] + cost[k, j]
                 if below >= best:
                     continue
-                area = _normal(points[i], points[j], points[k], mine)
-                total = below + area
+                total = below + _normal(points[i], points[j], points[k], mine)
                 total += 0.5 * _square(points[i], points[k]) * _turn(mine, facing[i, k])
                 total += 0.5 * _square(points[k], points[j]) * _turn(mine, facing[k, j])
                 if span == n - 1:
@@ -78,35 +96,41 @@ def fill_loop(points: Array, normals: Array, forbidden: BoolArray) -> IntArray:
                     split[i, j] = k
             cost[i, j] = best
             if split[i, j] >= 0:
-                _normal(points[i], points[j], points[split[i, j]], mine)
-                facing[i, j] = mine
-    if not np.isfinite(cost[0, n - 1]):
-        return np.empty((0, 3), dtype=np.int64)
-    triangles = np.empty((n - 2, 3), dtype=np.int64)
-    stack = np.empty((n, 2), dtype=np.int64)
-    stack[0, 0], stack[0, 1] = 0, n - 1
-    top, count = 1, 0
+                _normal(points[i], points[j], points[split[i, j]], facing[i, j])
+    if not cost[0, n - 1] < np.inf:
+        return
+    stack[0, 0] = 0
+    stack[0, 1] = n - 1
+    top = 1
+    count = 0
     while top:
         top -= 1
-        i, j = stack[top, 0], stack[top, 1]
+        i = stack[top, 0]
+        j = stack[top, 1]
         if j - i < 2:
             continue
         k = split[i, j]
-        triangles[count, 0], triangles[count, 1], triangles[count, 2] = i, j, k
+        triangles[count, 0] = i
+        triangles[count, 1] = j
+        triangles[count, 2] = k
         count += 1
-        stack[top, 0], stack[top, 1] = i, k
-        stack[top + 1, 0], stack[top + 1, 1] = k, j
+        stack[top, 1] = k
+        stack[top + 1, 0] = k
+        stack[top + 1, 1] = j
         top += 2
-    return triangles
+
+
+def narrowest(points: Array, forbidden: BoolArray) -> tuple[int, int]:
+    """The chord (i, j) of a loop that is shortest for the length of rim it cuts off; (-1, -1) when there is none."""
+    x, y, z = (np.roll(points, -1, axis=0) - points).T
+    along = np.concatenate([[0.0], np.cumsum(np.sqrt(x**2 + y**2 + z**2))])
+    found: tuple[int, int] = _narrowest(points, along, forbidden)
+    return found
 
 
 @njit(cache=True)
-def narrowest(points: Array, forbidden: BoolArray) -> tuple[int, int]:
-    """The chord (i, j) of a loop that is shortest for the length of rim it cuts off; (-1, -1) when there is none."""
+def _narrowest(points: Array, along: Array, forbidden: BoolArray) -> tuple[int, int]:
     n = len(points)
-    along = np.zeros(n + 1)
-    for i in range(n):
-        along[i + 1] = along[i] + np.sqrt(_square(points[i], points[(i + 1) % n]))
     best = np.inf
     bi = -1
     bj = -1
@@ -126,7 +150,6 @@ def narrowest(points: Array, forbidden: BoolArray) -> tuple[int, int]:
     return bi, bj
 
 
-@njit(cache=True)
 def strip(p: Array, q: Array, p_normals: Array, q_normals: Array) -> tuple[float, IntArray]:
     """The cheapest strip between an open polyline `p` (n + 1, 3) and `q` (m + 1, 3), both running the same way.
 
@@ -134,16 +157,24 @@ def strip(p: Array, q: Array, p_normals: Array, q_normals: Array) -> tuple[float
     (n + m,): 0 advances on p, 1 on q.
     """
     n, m = len(p) - 1, len(q) - 1
-    came = np.zeros((n + 1, m + 1), dtype=np.uint8)
-    row = np.full(m + 1, np.inf)
-    mine = np.zeros(3)
+    row, moves = np.full(m + 1, np.inf), np.empty(n + m, dtype=np.int64)
+    _strip(p, q, p_normals, q_normals, np.zeros((n + 1, m + 1), dtype=np.uint8), row, np.zeros(3), moves)
+    return float(row[m]), moves
+
+
+@njit(cache=True)
+def _strip(
+    p: Array, q: Array, p_normals: Array, q_normals: Array, came: Bytes, row: Array, mine: Array, moves: IntArray
+) -> None:
+    n = len(p) - 1
+    m = len(q) - 1
     for i in range(n + 1):
         left = np.inf
         for j in range(m + 1):
             best = np.inf
             if i == 0 and j == 0:
                 best = 0.0
-            if i > 0 and np.isfinite(row[j]):
+            if i > 0 and row[j] < np.inf:
                 area = _normal(p[i], p[i - 1], q[j], mine)
                 best = row[j] + area * (1.0 + 2.0 * _turn(mine, p_normals[i - 1]))
                 came[i, j] = 0
@@ -156,12 +187,11 @@ def strip(p: Array, q: Array, p_normals: Array, q_normals: Array) -> tuple[float
             best += SPREAD * _square(p[i], q[j])
             row[j] = best
             left = best
-    moves = np.empty(n + m, dtype=np.int64)
-    i, j = n, m
+    i = n
+    j = m
     for at in range(n + m - 1, -1, -1):
         moves[at] = came[i, j]
         if came[i, j] == 0:
             i -= 1
         else:
             j -= 1
-    return row[m], moves

@@ -1,4 +1,5 @@
 """Kernels of cleaning: which triangles stay together at edges and vertices that too many triangles use."""
+# mypy: disable-error-code="untyped-decorator,no-any-return,no-untyped-def,no-untyped-call"
 
 from __future__ import annotations
 
@@ -7,7 +8,6 @@ from numba import njit
 from patchwright.models.arrays import Array, BoolArray, IntArray
 
 
-@njit(cache=True)
 def sector_partners(
     edges: IntArray, offsets: IntArray, users: IntArray, points: Array, triangles: IntArray
 ) -> tuple[IntArray, IntArray]:
@@ -17,50 +17,96 @@ def sector_partners(
     triangles are sorted by angle; two neighbours in that order that enclose material (each running the edge the other
     way, the material between them) are a pair. Returns (2, p): left, right.
     """
-    left = np.empty(len(users), dtype=np.int64)
-    right = np.empty(len(users), dtype=np.int64)
+    left, right = np.empty(len(users), dtype=np.int64), np.empty(len(users), dtype=np.int64)
+    most = int(np.diff(offsets).max(initial=0))
+    count = _sector_partners(
+        edges, offsets, users, points, triangles, np.zeros(most), np.zeros(most, dtype=np.bool_),
+        np.empty(most, dtype=np.bool_), np.empty(most, dtype=np.int64), left, right,
+    )  # fmt: skip
+    return left[:count].copy(), right[:count].copy()
+
+
+@njit(cache=True)
+def _sector_partners(
+    edges: IntArray,
+    offsets: IntArray,
+    users: IntArray,
+    points: Array,
+    triangles: IntArray,
+    angle: Array,
+    forward: BoolArray,
+    used: BoolArray,
+    order: IntArray,
+    left: IntArray,
+    right: IntArray,
+) -> int:
+    """The number of pairs; `angle`, `forward`, `used`, `order` have room for the triangles around one edge."""
     count = 0
-    for e in range(len(edges)):
-        n = offsets[e + 1] - offsets[e]
-        lo, hi = edges[e, 0], edges[e, 1]
-        axis = points[hi] - points[lo]
-        length = np.sqrt(axis[0] ** 2 + axis[1] ** 2 + axis[2] ** 2)
+    for e in range(edges.shape[0]):
+        begin = offsets[e]
+        n = offsets[e + 1] - begin
+        lo = edges[e, 0]
+        hi = edges[e, 1]
+        px = points[lo, 0]
+        py = points[lo, 1]
+        pz = points[lo, 2]
+        ax = points[hi, 0] - px
+        ay = points[hi, 1] - py
+        az = points[hi, 2] - pz
+        length = np.sqrt(ax * ax + ay * ay + az * az)
         if length == 0.0:
             continue
-        axis = axis / length
-        small = 0
-        for k in range(3):
-            if abs(axis[k]) < abs(axis[small]):
-                small = k
-        other = np.zeros(3)
-        other[small] = 1.0
-        x = np.cross(axis, other)
-        x /= np.sqrt(x[0] ** 2 + x[1] ** 2 + x[2] ** 2)
-        y = np.cross(axis, x)
-        angle = np.empty(n)
-        forward = np.empty(n, dtype=np.bool_)
+        ax = ax / length
+        ay = ay / length
+        az = az / length
+        # x = axis x the coordinate direction farthest from it, y = axis x x
+        ux = abs(ax)
+        uy = abs(ay)
+        uz = abs(az)
+        if uz < ux and uz < uy:
+            ux, uy, uz = ay, -ax, 0.0
+        elif uy < ux:
+            ux, uy, uz = -az, 0.0, ax
+        else:
+            ux, uy, uz = 0.0, az, -ay
+        length = np.sqrt(ux * ux + uy * uy + uz * uz)
+        ux = ux / length
+        uy = uy / length
+        uz = uz / length
+        vx = ay * uz - az * uy
+        vy = az * ux - ax * uz
+        vz = ax * uy - ay * ux
         for i in range(n):
-            t = users[offsets[e] + i]
+            t = users[begin + i]
+            angle[i] = 0.0
+            forward[i] = False
             for k in range(3):
                 v = triangles[t, k]
+                after = triangles[t, 0 if k == 2 else k + 1]
                 if v != lo and v != hi:
-                    w = points[v] - points[lo]
-                    angle[i] = np.arctan2(
-                        w[0] * y[0] + w[1] * y[1] + w[2] * y[2], w[0] * x[0] + w[1] * x[1] + w[2] * x[2]
-                    )
-                if v == lo and triangles[t, (k + 1) % 3] == hi:
+                    wx = points[v, 0] - px
+                    wy = points[v, 1] - py
+                    wz = points[v, 2] - pz
+                    angle[i] = np.arctan2(wx * vx + wy * vy + wz * vz, wx * ux + wy * uy + wz * uz)
+                elif v == lo and after == hi:
                     forward[i] = True
-                if v == hi and triangles[t, (k + 1) % 3] == lo:
+                elif v == hi and after == lo:
                     forward[i] = False
-        order = np.argsort(angle)
+            used[i] = False
+            j = i
+            while j > 0 and angle[i] < angle[order[j - 1]]:
+                order[j] = order[j - 1]
+                j -= 1
+            order[j] = i
         # a triangle that runs lo -> hi has its normal on the side of growing angle: the material lies below it
-        used = np.zeros(n, dtype=np.bool_)
         for i in range(n):
-            p, q = order[i], order[(i + 1) % n]
+            p = order[i]
+            q = order[0 if i == n - 1 else i + 1]
             if not forward[p] and forward[q] and not used[p] and not used[q]:
-                used[p] = used[q] = True
-                left[count] = users[offsets[e] + p]
-                right[count] = users[offsets[e] + q]
+                used[p] = True
+                used[q] = True
+                left[count] = users[begin + p]
+                right[count] = users[begin + q]
                 count += 1
         # what is left: the two that continue each other best
         while True:
@@ -78,23 +124,36 @@ def sector_partners(
                         bq = q
             if bp < 0:
                 break
-            used[bp] = used[bq] = True
-            left[count] = users[offsets[e] + bp]
-            right[count] = users[offsets[e] + bq]
+            used[bp] = True
+            used[bq] = True
+            left[count] = users[begin + bp]
+            right[count] = users[begin + bq]
             count += 1
-    return left[:count].copy(), right[:count].copy()
+    return count
 
 
-@njit(cache=True)
 def fans(triangles: IntArray, neighbours: IntArray, left: IntArray, right: IntArray, splits: BoolArray) -> IntArray:
     """(m, 3) label of the fan each corner belongs to: corners of one vertex joined through shared edges.
 
     `left`, `right` are further pairs of triangles joined at an edge; only vertices of `splits` are told apart, all
     corners of any other vertex are one fan. The label of a fan is its smallest corner number 3 t + k.
     """
+    label = np.arange(3 * len(triangles))
+    _fans(triangles, neighbours, left, right, splits, np.full(len(splits), -1, dtype=np.int64), label)
+    return label.reshape(-1, 3)
+
+
+@njit(cache=True)
+def _fans(
+    triangles: IntArray,
+    neighbours: IntArray,
+    left: IntArray,
+    right: IntArray,
+    splits: BoolArray,
+    first: IntArray,
+    parent: IntArray,
+) -> None:
     m = len(triangles)
-    parent = np.arange(3 * m)
-    first = np.full(len(splits), -1, dtype=np.int64)
     for t in range(m):
         for k in range(3):
             v = triangles[t, k]
@@ -104,24 +163,27 @@ def fans(triangles: IntArray, neighbours: IntArray, left: IntArray, right: IntAr
                 parent[3 * t + k] = first[v]
     total = 3 * m + len(left)
     for at in range(total):
+        u = -1
+        w = -1
         if at < 3 * m:
             t = at // 3
-            s = neighbours[t, at % 3]
+            k = at - 3 * t
+            s = neighbours[t, k]
             if s < t:
                 continue
-            u = triangles[t, at % 3]
-            w = triangles[t, (at % 3 + 1) % 3]
+            u = triangles[t, k]
+            w = triangles[t, 0 if k == 2 else k + 1]
         else:
-            t, s = left[at - 3 * m], right[at - 3 * m]
-            u = -1
-            w = -1
+            t = left[at - 3 * m]
+            s = right[at - 3 * m]
         for k in range(3):
             v = triangles[t, k]
             if u >= 0 and v != u and v != w:
                 continue
             for j in range(3):
                 if triangles[s, j] == v:
-                    a, b = 3 * t + k, 3 * s + j
+                    a = 3 * t + k
+                    b = 3 * s + j
                     while parent[a] != a:
                         parent[a] = parent[parent[a]]
                         a = parent[a]
@@ -132,10 +194,5 @@ def fans(triangles: IntArray, neighbours: IntArray, left: IntArray, right: IntAr
                         parent[b] = a
                     else:
                         parent[a] = b
-    label = np.empty((m, 3), dtype=np.int64)
-    for c in range(3 * m):
-        a = c
-        while parent[a] != a:
-            a = parent[a]
-        label[c // 3, c % 3] = a
-    return label
+    for c in range(3 * m):  # a root is the lowest of its set, so what comes before c is its root already
+        parent[c] = parent[parent[c]]

@@ -1,4 +1,5 @@
 """Kernel of conforming: which free edge each rim vertex lies on."""
+# mypy: disable-error-code="untyped-decorator,no-any-return,no-untyped-def,no-untyped-call"
 
 from __future__ import annotations
 
@@ -7,7 +8,6 @@ from numba import njit
 from patchwright.models.arrays import Array, IntArray
 
 
-@njit(cache=True)
 def nearest_edges(
     rim: IntArray,
     points: Array,
@@ -26,19 +26,39 @@ def nearest_edges(
     is nearer to neither end than that. `order` sorts the edges by their lowest x, `low` are those x in that
     order, `high` the running maximum of the highest x.
     """
-    edge = np.full(len(rim), -1, dtype=np.int64)
-    at = np.zeros(len(rim))
-    gap = np.full(len(rim), np.inf)
+    edge, at, gap = np.full(len(rim), -1, dtype=np.int64), np.zeros(len(rim)), np.full(len(rim), np.inf)
+    first = np.searchsorted(high, points[rim, 0] - distance)
+    _nearest_edges(rim, points, start, end, apex, order, low, first, distance, share, edge, at, gap)
+    return edge, at, gap
+
+
+@njit(cache=True)
+def _nearest_edges(
+    rim: IntArray,
+    points: Array,
+    start: IntArray,
+    end: IntArray,
+    apex: IntArray,
+    order: IntArray,
+    low: Array,
+    first: IntArray,
+    distance: float,
+    share: float,
+    edge: IntArray,
+    at: Array,
+    gap: Array,
+) -> None:
     for i in range(len(rim)):
         v = rim[i]
-        p = points[v]
-        first = np.searchsorted(high, p[0] - distance)
-        for place in range(first, len(order)):
-            if low[place] > p[0] + distance:
+        reach = points[v, 0] + distance
+        for place in range(first[i], len(order)):
+            if low[place] > reach:
                 break
             e = order[place]
-            a, b, c = start[e], end[e], apex[e]
-            if v in (a, b, c):
+            a = start[e]
+            b = end[e]
+            c = apex[e]
+            if v == a or v == b or v == c:
                 continue
             ab = 0.0
             ap = 0.0
@@ -47,7 +67,7 @@ def nearest_edges(
             cc = 0.0
             for k in range(3):
                 t = points[b, k] - points[a, k]
-                u = p[k] - points[a, k]
+                u = points[v, k] - points[a, k]
                 w = points[c, k] - points[a, k]
                 ab += t * t
                 ap += t * u
@@ -59,14 +79,15 @@ def nearest_edges(
             t = ap / ab
             if t <= 0.0 or t >= 1.0:
                 continue
-            d = np.sqrt(max(0.0, pp - ap * ap / ab))
-            height = np.sqrt(max(0.0, cc - ac * ac / ab))
+            square = pp - ap * ap / ab
+            d = np.sqrt(square) if square > 0.0 else 0.0
+            square = cc - ac * ac / ab
+            height = np.sqrt(square) if square > 0.0 else 0.0
             if d > distance or d > share * height or d >= gap[i]:
                 continue
-            length = np.sqrt(ab)
-            if min(t, 1.0 - t) * length <= d or min(t, 1.0 - t) < 1e-9:
+            rest = t if t < 1.0 - t else 1.0 - t
+            if rest * np.sqrt(ab) <= d or rest < 1e-9:
                 continue
             gap[i] = d
             edge[i] = e
             at[i] = t
-    return edge, at, gap

@@ -1,4 +1,5 @@
 """Kernel of self-intersection: which pairs of triangles cross."""
+# mypy: disable-error-code="untyped-decorator,no-any-return,no-untyped-def,no-untyped-call"
 
 from __future__ import annotations
 
@@ -8,58 +9,91 @@ from patchwright.models.arrays import Array, BoolArray, IntArray
 
 
 @njit(cache=True)
-def _volume(a: Array, b: Array, c: Array, d: Array) -> float:
-    ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
-    vx, vy, vz = c[0] - a[0], c[1] - a[1], c[2] - a[2]
-    wx, wy, wz = d[0] - a[0], d[1] - a[1], d[2] - a[2]
+def _volume(points: Array, a: int, b: int, c: int, d: int) -> float:
+    ax = points[a, 0]
+    ay = points[a, 1]
+    az = points[a, 2]
+    ux = points[b, 0] - ax
+    uy = points[b, 1] - ay
+    uz = points[b, 2] - az
+    vx = points[c, 0] - ax
+    vy = points[c, 1] - ay
+    vz = points[c, 2] - az
+    wx = points[d, 0] - ax
+    wy = points[d, 1] - ay
+    wz = points[d, 2] - az
     return wx * (uy * vz - uz * vy) + wy * (uz * vx - ux * vz) + wz * (ux * vy - uy * vx)
 
 
 @njit(cache=True)
-def _pierces(p: Array, q: Array, a: Array, b: Array, c: Array, depth: float) -> bool:
-    """Whether the segment p q passes through the inside of a b c, both ends farther than `depth` from its plane."""
-    ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
-    vx, vy, vz = c[0] - a[0], c[1] - a[1], c[2] - a[2]
-    nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
-    size = np.sqrt(nx * nx + ny * ny + nz * nz)
-    if size == 0.0:
-        return False
-    sp = ((p[0] - a[0]) * nx + (p[1] - a[1]) * ny + (p[2] - a[2]) * nz) / size
-    sq = ((q[0] - a[0]) * nx + (q[1] - a[1]) * ny + (q[2] - a[2]) * nz) / size
-    if not ((sp > depth and sq < -depth) or (sp < -depth and sq > depth)):
-        return False
-    x, y, z = _volume(p, q, a, b), _volume(p, q, b, c), _volume(p, q, c, a)
-    tiny = depth * np.sqrt((p[0] - q[0]) ** 2 + (p[1] - q[1]) ** 2 + (p[2] - q[2]) ** 2) * np.sqrt(size)
-    return (x > tiny and y > tiny and z > tiny) or (x < -tiny and y < -tiny and z < -tiny)
+def _height(points: Array, p: int, a: int, nx: float, ny: float, nz: float) -> float:
+    return (points[p, 0] - points[a, 0]) * nx + (points[p, 1] - points[a, 1]) * ny + (points[p, 2] - points[a, 2]) * nz
 
 
 @njit(cache=True)
+def _pierces(points: Array, p: int, q: int, a: int, b: int, c: int, depth: float) -> bool:
+    """Whether the segment p q passes through the inside of a b c, both ends farther than `depth` from its plane."""
+    ux = points[b, 0] - points[a, 0]
+    uy = points[b, 1] - points[a, 1]
+    uz = points[b, 2] - points[a, 2]
+    vx = points[c, 0] - points[a, 0]
+    vy = points[c, 1] - points[a, 1]
+    vz = points[c, 2] - points[a, 2]
+    nx = uy * vz - uz * vy
+    ny = uz * vx - ux * vz
+    nz = ux * vy - uy * vx
+    size = np.sqrt(nx * nx + ny * ny + nz * nz)
+    if size == 0.0:
+        return False
+    sp = _height(points, p, a, nx, ny, nz) / size
+    sq = _height(points, q, a, nx, ny, nz) / size
+    if not ((sp > depth and sq < -depth) or (sp < -depth and sq > depth)):
+        return False
+    x = _volume(points, p, q, a, b)
+    y = _volume(points, p, q, b, c)
+    z = _volume(points, p, q, c, a)
+    ux = points[p, 0] - points[q, 0]
+    uy = points[p, 1] - points[q, 1]
+    uz = points[p, 2] - points[q, 2]
+    tiny = depth * np.sqrt(ux * ux + uy * uy + uz * uz) * np.sqrt(size)
+    return (x > tiny and y > tiny and z > tiny) or (x < -tiny and y < -tiny and z < -tiny)
+
+
 def crossing(pairs: IntArray, points: Array, triangles: IntArray, depth: float) -> BoolArray:
     """(k,) whether an edge of one triangle passes through the inside of the other.
 
     Triangles that share an edge do not count; of those that share a vertex the opposite edges are tested.
     """
     found = np.zeros(len(pairs), dtype=np.bool_)
+    _crossing(pairs, points, triangles, depth, found)
+    return found
+
+
+@njit(cache=True)
+def _crossing(pairs: IntArray, points: Array, triangles: IntArray, depth: float, found: BoolArray) -> None:
     for at in range(len(pairs)):
         shared = 0
         mine = -1
         yours = -1
-        s, t = triangles[pairs[at, 0]], triangles[pairs[at, 1]]
+        s = pairs[at, 0]
+        t = pairs[at, 1]
         for i in range(3):
             for j in range(3):
-                if s[i] == t[j]:
+                if triangles[s, i] == triangles[t, j]:
                     shared += 1
                     mine = i
                     yours = j
         if shared > 1:
             continue
-        for k in range(3):
-            if shared == 0 or k == (mine + 1) % 3:
-                found[at] |= _pierces(
-                    points[s[k]], points[s[(k + 1) % 3]], points[t[0]], points[t[1]], points[t[2]], depth
-                )
-            if shared == 0 or k == (yours + 1) % 3:
-                found[at] |= _pierces(
-                    points[t[k]], points[t[(k + 1) % 3]], points[s[0]], points[s[1]], points[s[2]], depth
-                )
-    return found
+        for turn in range(2):  # edges of the first against the second, then the other way
+            a = triangles[t, 0]
+            b = triangles[t, 1]
+            c = triangles[t, 2]
+            for k in range(3):
+                after = 0 if k == 2 else k + 1
+                if not found[at] and (shared == 0 or (k != mine and after != mine)):
+                    found[at] = _pierces(points, triangles[s, k], triangles[s, after], a, b, c, depth)
+            swap = s
+            s = t
+            t = swap
+            mine = yours

@@ -1,4 +1,5 @@
 """Kernel of orientation: a walk over neighbouring triangles."""
+# mypy: disable-error-code="untyped-decorator,no-any-return,no-untyped-def,no-untyped-call"
 
 from __future__ import annotations
 
@@ -7,15 +8,21 @@ from numba import njit
 from patchwright.models.arrays import BoolArray, IntArray
 
 
-@njit(cache=True)
 def walk(triangles: IntArray, neighbours: IntArray) -> tuple[IntArray, BoolArray, BoolArray]:
     """Component of each triangle, whether it must be reversed to agree with the component's first triangle, and
     whether it disagrees with a neighbour all the same (a one-sided surface)."""
     m = len(triangles)
     component = np.full(m, -1, dtype=np.int64)
-    turn = np.zeros(m, dtype=np.bool_)
-    bad = np.zeros(m, dtype=np.bool_)
-    stack = np.empty(m, dtype=np.int64)
+    turn, bad = np.zeros(m, dtype=np.bool_), np.zeros(m, dtype=np.bool_)
+    _walk(triangles, neighbours, component, turn, bad, np.empty(m, dtype=np.int64))
+    return component, turn, bad
+
+
+@njit(cache=True)
+def _walk(
+    triangles: IntArray, neighbours: IntArray, component: IntArray, turn: BoolArray, bad: BoolArray, stack: IntArray
+) -> None:
+    m = len(triangles)
     parts = 0
     for seed in range(m):
         if component[seed] >= 0:
@@ -30,12 +37,12 @@ def walk(triangles: IntArray, neighbours: IntArray) -> tuple[IntArray, BoolArray
                 s = neighbours[t, k]
                 if s < 0:
                     continue
-                a, b = triangles[t, k], triangles[t, (k + 1) % 3]
-                same = False
+                a = triangles[t, k]
+                b = triangles[t, 0 if k == 2 else k + 1]
+                want = turn[t]
                 for j in range(3):
-                    if triangles[s, j] == a and triangles[s, (j + 1) % 3] == b:
-                        same = True
-                want = turn[t] ^ same
+                    if triangles[s, j] == a and triangles[s, 0 if j == 2 else j + 1] == b:
+                        want = not turn[t]
                 if component[s] < 0:
                     component[s] = parts
                     turn[s] = want
@@ -44,4 +51,3 @@ def walk(triangles: IntArray, neighbours: IntArray) -> tuple[IntArray, BoolArray
                 elif turn[s] != want:
                     bad[s] = True
         parts += 1
-    return component, turn, bad

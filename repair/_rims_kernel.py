@@ -1,4 +1,5 @@
 """Kernel of the rims: which stretch of which rim each sample of a rim faces."""
+# mypy: disable-error-code="untyped-decorator,no-any-return,no-untyped-def,no-untyped-call"
 
 from __future__ import annotations
 
@@ -8,7 +9,6 @@ from numba import njit
 from patchwright.models.arrays import Array, IntArray
 
 
-@njit(cache=True)
 def facing(
     points: Array,
     outward: Array,
@@ -43,56 +43,99 @@ def facing(
     least `bend` times farther apart along it than across, and `apart_share` of its length: the sides of a mere corner
     or of a saw's tooth do not face each other.
     """
-    count = len(points)
-    found = np.full(count, -1, dtype=np.int64)
-    way = np.full(count, np.inf)
+    found, way = np.full(len(points), -1, dtype=np.int64), np.full(len(points), np.inf)
+    room = np.empty(len(reach), dtype=np.int64)
+    _facing(
+        points, outward, loop, edge, span, place, offsets, begin, start, end, edge_outward, low, high, reach, near,
+        share, cosine, fold, bend, apart_share, room, found, way,
+    )  # fmt: skip
+    return found, way
+
+
+@njit(cache=True)
+def _box_distance(low: Array, high: Array, a_low: Array, a_high: Array, i: int, j: int) -> float:
+    """Squared distance of box i of `a` from box j."""
+    apart = 0.0
+    for k in range(3):
+        step = max(low[j, k] - a_high[i, k], a_low[i, k] - high[j, k])
+        if step > 0.0:
+            apart += step * step
+    return apart
+
+
+@njit(cache=True)
+def _facing(
+    points: Array,
+    outward: Array,
+    loop: IntArray,
+    edge: IntArray,
+    span: Array,
+    place: Array,
+    offsets: IntArray,
+    begin: Array,
+    start: Array,
+    end: Array,
+    edge_outward: Array,
+    low: Array,
+    high: Array,
+    reach: Array,
+    near: float,
+    share: float,
+    cosine: float,
+    fold: float,
+    bend: float,
+    apart_share: float,
+    candidates: IntArray,
+    found: IntArray,
+    way: Array,
+) -> None:
     loops = len(reach)
-    candidates = np.empty(loops, dtype=np.int64)
     current = -1
     total = 0
-    for s in range(count):
+    for s in range(len(points)):
         own = loop[s]
         if own != current:
             current = own
             total = 0
             for other in range(loops):
-                apart = 0.0
-                for k in range(3):
-                    step = max(low[own, k] - high[other, k], low[other, k] - high[own, k])
-                    if step > 0.0:
-                        apart += step * step
-                if other == own or apart <= reach[own] * reach[own]:
+                if other == own or _box_distance(low, high, low, high, own, other) <= reach[own] * reach[own]:
                     candidates[total] = other
                     total += 1
-        px, py, pz = points[s, 0], points[s, 1], points[s, 2]
-        ox, oy, oz = outward[s, 0], outward[s, 1], outward[s, 2]
-        first, last = offsets[own], offsets[own + 1]
-        size = last - first
-        around = begin[last] - begin[first]
+        px = points[s, 0]
+        py = points[s, 1]
+        pz = points[s, 2]
+        ox = outward[s, 0]
+        oy = outward[s, 1]
+        oz = outward[s, 2]
+        size = offsets[own + 1] - offsets[own]
+        around = begin[offsets[own + 1]] - begin[offsets[own]]
         for c in range(total):
             other = candidates[c]
             limit = min(way[s], reach[own]) if other != own else way[s]
-            apart = 0.0
-            for k in range(3):
-                step = max(low[other, k] - points[s, k], points[s, k] - high[other, k])
-                if step > 0.0:
-                    apart += step * step
-            if apart > limit * limit:
+            if _box_distance(low, high, points, points, s, other) > limit * limit:
                 continue
             for e in range(offsets[other], offsets[other + 1]):
                 if e == edge[s]:
                     continue
-                ax, ay, az = start[e, 0], start[e, 1], start[e, 2]
-                bx, by, bz = end[e, 0] - ax, end[e, 1] - ay, end[e, 2] - az
+                ax = start[e, 0]
+                ay = start[e, 1]
+                az = start[e, 2]
+                bx = end[e, 0] - ax
+                by = end[e, 1] - ay
+                bz = end[e, 2] - az
                 square = bx * bx + by * by + bz * bz
                 t = 0.0
                 if square > 0.0:
                     t = min(1.0, max(0.0, ((px - ax) * bx + (py - ay) * by + (pz - az) * bz) / square))
-                dx, dy, dz = ax + t * bx - px, ay + t * by - py, az + t * bz - pz
+                dx = ax + t * bx - px
+                dy = ay + t * by - py
+                dz = az + t * bz - pz
                 distance = np.sqrt(dx * dx + dy * dy + dz * dz)
                 if distance >= limit:
                     continue
-                ux, uy, uz = edge_outward[e, 0], edge_outward[e, 1], edge_outward[e, 2]
+                ux = edge_outward[e, 0]
+                uy = edge_outward[e, 1]
+                uz = edge_outward[e, 2]
                 turn = -(ox * ux + oy * uy + oz * uz)
                 beside = False
                 if other == own:
@@ -113,10 +156,8 @@ def facing(
                     limit = distance
                     way[s] = distance
                     found[s] = e
-    return found, way
 
 
-@njit(cache=True)
 def nearest_other(
     points: Array, owner: IntArray, start: Array, end: Array, of: IntArray
 ) -> tuple[IntArray, Array, Array]:
@@ -126,10 +167,23 @@ def nearest_other(
     there is no other curve.
     """
     count = len(points)
-    chord = np.full(count, -1, dtype=np.int64)
-    place = np.zeros(count)
-    best = np.full(count, np.inf)
-    for s in range(count):
+    chord, place, best = np.full(count, -1, dtype=np.int64), np.zeros(count), np.full(count, np.inf)
+    _nearest_other(points, owner, start, end, of, chord, place, best)
+    return chord, place, best
+
+
+@njit(cache=True)
+def _nearest_other(
+    points: Array,
+    owner: IntArray,
+    start: Array,
+    end: Array,
+    of: IntArray,
+    chord: IntArray,
+    place: Array,
+    best: Array,
+) -> None:
+    for s in range(len(points)):
         px, py, pz = points[s, 0], points[s, 1], points[s, 2]
         least = np.inf
         for e in range(len(of)):
@@ -148,4 +202,3 @@ def nearest_other(
                 chord[s] = e
                 place[s] = t
         best[s] = np.sqrt(least)
-    return chord, place, best

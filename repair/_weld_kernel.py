@@ -1,4 +1,5 @@
 """Kernels of welding: exact merging, candidate pairs of free edges, the greedy matching and its disjoint sets."""
+# mypy: disable-error-code="untyped-decorator,no-any-return,no-untyped-def,no-untyped-call"
 
 from __future__ import annotations
 
@@ -7,6 +8,7 @@ from numba import njit
 from patchwright.models.arrays import Array, IntArray
 
 CANDIDATES = 6  # nearest free edges kept per free edge
+NOWHERE = -10000  # level of the grid for an edge that reaches nowhere
 
 
 @njit(cache=True)
@@ -19,16 +21,25 @@ def _mix(h: int) -> int:
     return h
 
 
-@njit(cache=True)
 def merge_exact(bits: IntArray) -> IntArray:
     """(n,) index of the first row with the same three 64-bit words, of (n, 3) `bits`."""
-    n = len(bits)
+    first = np.empty(len(bits), dtype=np.int64)
+    _merge_exact(bits, np.full(_slots(len(bits)), -1, dtype=np.int64), first)
+    return first
+
+
+def _slots(n: int) -> int:
+    """A power of two, at least twice `n`."""
     size = 16
     while size < 2 * n:
         size *= 2
-    table = np.full(size, -1, dtype=np.int64)
-    first = np.empty(n, dtype=np.int64)
-    for i in range(n):
+    return size
+
+
+@njit(cache=True)
+def _merge_exact(bits: IntArray, table: IntArray, first: IntArray) -> None:
+    size = len(table)
+    for i in range(len(bits)):
         slot = _mix(_mix(_mix(bits[i, 0]) ^ bits[i, 1]) ^ bits[i, 2]) & (size - 1)
         while True:
             other = table[slot]
@@ -40,24 +51,6 @@ def merge_exact(bits: IntArray) -> IntArray:
                 first[i] = other
                 break
             slot = (slot + 1) & (size - 1)
-    return first
-
-
-@njit(cache=True)
-def bucket(keys: IntArray, size: int) -> tuple[IntArray, IntArray]:
-    """Counting sort of `keys` by their hash: offsets (size + 1,) and the items of each slot in order."""
-    offsets = np.zeros(size + 1, dtype=np.int64)
-    for k in range(len(keys)):
-        offsets[(_mix(keys[k]) & (size - 1)) + 1] += 1
-    for s in range(size):
-        offsets[s + 1] += offsets[s]
-    fill = offsets[:-1].copy()
-    items = np.empty(len(keys), dtype=np.int64)
-    for k in range(len(keys)):
-        s = _mix(keys[k]) & (size - 1)
-        items[fill[s]] = k
-        fill[s] += 1
-    return offsets, items
 
 
 @njit(cache=True)
@@ -65,7 +58,6 @@ def _cell(level: int, i: int, j: int, k: int) -> int:
     return _mix(_mix(_mix(level * 73856093 + i) ^ (j * 19349663)) ^ (k * 83492791))
 
 
-@njit(cache=True)
 def edge_candidates(
     a: Array, b: Array, apex: Array, tag: IntArray, distance: float, share: float
 ) -> tuple[IntArray, Array, IntArray]:
@@ -79,61 +71,105 @@ def edge_candidates(
     partner = np.full((n, CANDIDATES), -1, dtype=np.int64)
     gap = np.full((n, CANDIDATES), np.inf)
     kind = np.zeros((n, CANDIDATES), dtype=np.int64)
-    reach = np.empty(n)
-    level = np.empty(n, dtype=np.int64)
-    for e in range(n):
-        length = np.sqrt((b[e, 0] - a[e, 0]) ** 2 + (b[e, 1] - a[e, 1]) ** 2 + (b[e, 2] - a[e, 2]) ** 2)
-        reach[e] = min(distance, share * length)
-        level[e] = -10000
-        if reach[e] > 0.0:
-            level[e] = int(np.ceil(np.log2(reach[e])))
+    along = b - a
+    reach = np.minimum(distance, share * np.sqrt(along[:, 0] ** 2 + along[:, 1] ** 2 + along[:, 2] ** 2))
+    level = np.full(n, NOWHERE)
+    level[reach > 0.0] = np.ceil(np.log2(reach[reach > 0.0])).astype(np.int64)
     # every edge lies in the grid of its own level and in the next finer one, where a shorter partner looks for it
-    keys = np.empty(2 * n, dtype=np.int64)
-    for e in range(n):
-        for down in range(2):
-            size = 2.0 ** (level[e] - down + 1)
-            x = 0.5 * (a[e, 0] + b[e, 0]) / size
-            y = 0.5 * (a[e, 1] + b[e, 1]) / size
-            z = 0.5 * (a[e, 2] + b[e, 2]) / size
-            keys[2 * e + down] = _cell(level[e] - down, int(np.floor(x)), int(np.floor(y)), int(np.floor(z)))
-    slots = 16
-    while slots < 2 * n:
-        slots *= 2
-    offsets, items = bucket(keys, slots)
-    for e in range(n):
-        if level[e] == -10000:
+    levels = np.stack([level, level - 1], axis=1)
+    sizes = np.exp2(levels + 1.0)
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        middle = 0.5 * (a + b)
+        cells = np.floor(middle[:, None] / sizes[:, :, None])
+        cells[level == NOWHERE] = 0.0
+        corner = np.floor(middle / sizes[:, :1] - 0.5)
+        corner[level == NOWHERE] = 0.0
+    keys, items = np.empty(2 * n, dtype=np.int64), np.empty(2 * n, dtype=np.int64)
+    offsets = np.zeros(_slots(n) + 2, dtype=np.int64)
+    _sort_cells(levels.reshape(-1), cells.reshape(-1, 3).astype(np.int64), keys, offsets, items)
+    _edge_candidates(
+        a, b, apex, tag, reach, level, corner.astype(np.int64), keys, offsets, items, partner, gap, kind
+    )
+    return partner, gap, kind
+
+
+@njit(cache=True)
+def _sort_cells(levels: IntArray, cells: IntArray, keys: IntArray, offsets: IntArray, items: IntArray) -> None:
+    """Counting sort of the cells by the hash of their keys: those of slot s are items[offsets[s]:offsets[s + 1]]."""
+    slots = len(offsets) - 2
+    for i in range(len(levels)):
+        keys[i] = _cell(levels[i], cells[i, 0], cells[i, 1], cells[i, 2])
+        offsets[(_mix(keys[i]) & (slots - 1)) + 2] += 1
+    for s in range(slots):
+        offsets[s + 2] += offsets[s + 1]
+    for i in range(len(levels)):
+        s = (_mix(keys[i]) & (slots - 1)) + 1
+        items[offsets[s]] = i
+        offsets[s] += 1
+
+
+@njit(cache=True)
+def _edge_candidates(
+    a: Array,
+    b: Array,
+    apex: Array,
+    tag: IntArray,
+    reach: Array,
+    level: IntArray,
+    first_cell: IntArray,
+    keys: IntArray,
+    offsets: IntArray,
+    items: IntArray,
+    partner: IntArray,
+    gap: Array,
+    kind: IntArray,
+) -> None:
+    last = partner.shape[1] - 1
+    slots = len(offsets) - 2
+    for e in range(len(a)):
+        if level[e] == NOWHERE:
             continue
-        size = 2.0 ** (level[e] + 1)
-        x = 0.5 * (a[e, 0] + b[e, 0]) / size - 0.5
-        y = 0.5 * (a[e, 1] + b[e, 1]) / size - 0.5
-        z = 0.5 * (a[e, 2] + b[e, 2]) / size - 0.5
-        i0, j0, k0 = int(np.floor(x)), int(np.floor(y)), int(np.floor(z))
         for corner in range(8):
-            key = _cell(level[e], i0 + (corner & 1), j0 + ((corner >> 1) & 1), k0 + (corner >> 2))
+            key = _cell(
+                level[e],
+                first_cell[e, 0] + (corner & 1),
+                first_cell[e, 1] + ((corner >> 1) & 1),
+                first_cell[e, 2] + (corner >> 2),
+            )
             s = _mix(key) & (slots - 1)
             for at in range(offsets[s], offsets[s + 1]):
                 if keys[items[at]] != key:
                     continue
-                f = items[at] // 2
+                f = items[at] >> 1
                 if f == e:
                     continue
-                near = min(reach[e], reach[f])
                 cross = 0.0
                 along = 0.0
                 cross2 = 0.0
                 along2 = 0.0
                 for d in range(3):
-                    cross += (a[e, d] - b[f, d]) ** 2
-                    cross2 += (b[e, d] - a[f, d]) ** 2
-                    along += (a[e, d] - a[f, d]) ** 2
-                    along2 += (b[e, d] - b[f, d]) ** 2
-                cross = np.sqrt(max(cross, cross2))
-                along = np.sqrt(max(along, along2))
-                best = min(cross, along)
-                if best > near:
+                    ea = a[e, d]
+                    eb = b[e, d]
+                    fa = a[f, d]
+                    fb = b[f, d]
+                    cross += (ea - fb) * (ea - fb)
+                    cross2 += (eb - fa) * (eb - fa)
+                    along += (ea - fa) * (ea - fa)
+                    along2 += (eb - fb) * (eb - fb)
+                cross = np.sqrt(cross if cross > cross2 else cross2)
+                along = np.sqrt(along if along > along2 else along2)
+                same_way = along < cross
+                best = along if same_way else cross
+                if best > reach[e] or best > reach[f] or best >= gap[e, last]:
+                    continue
+                twice = False
+                for m in range(last + 1):
+                    if partner[e, m] == f:
+                        twice = True
+                if twice:
                     continue
                 what = 0
-                if along < cross:
+                if same_way:
                     what += 4
                 if tag[e] != tag[f]:
                     what += 2
@@ -145,29 +181,22 @@ def edge_candidates(
                     t = b[e, d] - a[e, d]
                     ee += t * t
                     pe += t * (apex[e, d] - a[e, d])
-                    pf += t * (apex[f, d] - (a[f, d] if along < cross else b[f, d]))
+                    pf += t * (apex[f, d] - (a[f, d] if same_way else b[f, d]))
+                pe = pe / ee
+                pf = pf / ee
                 dot = 0.0
                 we = 0.0
                 wf = 0.0
                 for d in range(3):
                     t = b[e, d] - a[e, d]
-                    u = apex[e, d] - a[e, d] - pe / ee * t
-                    v = apex[f, d] - (a[f, d] if along < cross else b[f, d]) - pf / ee * t
+                    u = apex[e, d] - a[e, d] - pe * t
+                    v = apex[f, d] - (a[f, d] if same_way else b[f, d]) - pf * t
                     dot += u * v
                     we += u * u
                     wf += v * v
                 if dot > 0.5 * np.sqrt(we * wf):
                     what += 1
-                # insert by (distance)
-                if best >= gap[e, CANDIDATES - 1]:
-                    continue
-                twice = False
-                for m in range(CANDIDATES):
-                    if partner[e, m] == f:
-                        twice = True
-                if twice:
-                    continue
-                m = CANDIDATES - 1
+                m = last  # insert by distance
                 while m > 0 and gap[e, m - 1] > best:
                     gap[e, m] = gap[e, m - 1]
                     partner[e, m] = partner[e, m - 1]
@@ -176,7 +205,15 @@ def edge_candidates(
                 gap[e, m] = best
                 partner[e, m] = f
                 kind[e, m] = what
-    return partner, gap, kind
+
+
+@njit(cache=True)
+def _square(points: Array, i: int, j: int) -> float:
+    """Squared distance of points i and j."""
+    x = points[i, 0] - points[j, 0]
+    y = points[i, 1] - points[j, 1]
+    z = points[i, 2] - points[j, 2]
+    return x * x + y * y + z * z
 
 
 @njit(cache=True)
@@ -204,10 +241,7 @@ def _may_join(
     while i >= 0:
         j = q
         while j >= 0:
-            d = 0.0
-            for k in range(3):
-                d += (points[i, k] - points[j, k]) ** 2
-            if d > limit * limit:
+            if _square(points, i, j) > limit * limit:
                 return False
             j = follow[j]
         for at in range(offsets[i], offsets[i + 1]):
@@ -221,14 +255,25 @@ def _may_join(
 
 @njit(cache=True)
 def _join(p: int, q: int, parent: IntArray, follow: IntArray, last: IntArray) -> None:
-    if q < p:
-        p, q = q, p
-    parent[q] = p
-    follow[last[p]] = q
-    last[p] = last[q]
+    low = p if p < q else q
+    high = q if p < q else p
+    parent[high] = low
+    follow[last[low]] = high
+    last[low] = last[high]
 
 
 @njit(cache=True)
+def _settle(parent: IntArray) -> None:
+    """Make `parent` the root of each; a root is the lowest of its cluster."""
+    for i in range(len(parent)):
+        parent[i] = parent[parent[i]]
+
+
+def _singles(n: int) -> tuple[IntArray, IntArray, IntArray]:
+    """Clusters of one vertex each: parent, follower, last of each cluster."""
+    return np.arange(n), np.full(n, -1, dtype=np.int64), np.arange(n)
+
+
 def match_edges(
     left: IntArray,
     right: IntArray,
@@ -245,21 +290,44 @@ def match_edges(
 
     Returns each vertex's root (n,) and each edge's partner (e,), -1 where it has none.
     """
-    n = len(points)
-    parent = np.arange(n)
-    follow = np.full(n, -1, dtype=np.int64)
-    last = np.arange(n)
+    parent, follow, last = _singles(len(points))
     mate = np.full(len(start), -1, dtype=np.int64)
+    _match_edges(left, right, kinds, start, end, limit, points, triangles, offsets, around, parent, follow, last, mate)
+    _settle(parent)
+    return parent, mate
+
+
+@njit(cache=True)
+def _match_edges(
+    left: IntArray,
+    right: IntArray,
+    kinds: IntArray,
+    start: IntArray,
+    end: IntArray,
+    limit: float,
+    points: Array,
+    triangles: IntArray,
+    offsets: IntArray,
+    around: IntArray,
+    parent: IntArray,
+    follow: IntArray,
+    last: IntArray,
+    mate: IntArray,
+) -> None:
     for at in range(len(left)):
-        e, f = left[at], right[at]
+        e = left[at]
+        f = right[at]
         if mate[e] >= 0 or mate[f] >= 0:
             continue
-        a, b = _root(parent, start[e]), _root(parent, end[e])
-        if kinds[at] & 4:
-            c, d = _root(parent, start[f]), _root(parent, end[f])
-        else:
-            c, d = _root(parent, end[f]), _root(parent, start[f])
-        if a in (b, d) or c in (b, d):
+        a = _root(parent, start[e])
+        b = _root(parent, end[e])
+        c = _root(parent, start[f])
+        d = _root(parent, end[f])
+        if not kinds[at] & 4:
+            swap = c
+            c = d
+            d = swap
+        if a == b or a == d or c == b or c == d:
             continue
         if a != c and not _may_join(a, c, limit, parent, follow, points, triangles, offsets, around):
             continue
@@ -267,19 +335,16 @@ def match_edges(
             continue
         if a != c:
             _join(a, c, parent, follow, last)
-        b, d = _root(parent, b), _root(parent, d)
+        b = _root(parent, b)
+        d = _root(parent, d)
         if b != d:
             if not _may_join(b, d, limit, parent, follow, points, triangles, offsets, around):
                 continue
             _join(b, d, parent, follow, last)
         mate[e] = f
         mate[f] = e
-    for i in range(n):
-        parent[i] = _root(parent, i)
-    return parent, mate
 
 
-@njit(cache=True)
 def match_points(
     left: IntArray,
     right: IntArray,
@@ -290,28 +355,47 @@ def match_points(
     around: IntArray,
 ) -> IntArray:
     """(n,) roots after joining the pairs of vertices in the order given, where no triangle collapses."""
-    n = len(points)
-    parent = np.arange(n)
-    follow = np.full(n, -1, dtype=np.int64)
-    last = np.arange(n)
-    for at in range(len(left)):
-        p, q = _root(parent, left[at]), _root(parent, right[at])
-        if p != q and _may_join(p, q, limit, parent, follow, points, triangles, offsets, around):
-            _join(p, q, parent, follow, last)
-    for i in range(n):
-        parent[i] = _root(parent, i)
+    parent, follow, last = _singles(len(points))
+    _match_points(left, right, limit, points, triangles, offsets, around, parent, follow, last)
+    _settle(parent)
     return parent
 
 
 @njit(cache=True)
+def _match_points(
+    left: IntArray,
+    right: IntArray,
+    limit: float,
+    points: Array,
+    triangles: IntArray,
+    offsets: IntArray,
+    around: IntArray,
+    parent: IntArray,
+    follow: IntArray,
+    last: IntArray,
+) -> None:
+    for at in range(len(left)):
+        p = _root(parent, left[at])
+        q = _root(parent, right[at])
+        if p != q and _may_join(p, q, limit, parent, follow, points, triangles, offsets, around):
+            _join(p, q, parent, follow, last)
+
+
 def contract(left: IntArray, right: IntArray, limit: float, points: Array) -> IntArray:
     """(n,) roots after joining pairs of vertices in the order given, no cluster wider than `limit`."""
-    n = len(points)
-    parent = np.arange(n)
-    follow = np.full(n, -1, dtype=np.int64)
-    last = np.arange(n)
+    parent, follow, last = _singles(len(points))
+    _contract(left, right, limit, points, parent, follow, last)
+    _settle(parent)
+    return parent
+
+
+@njit(cache=True)
+def _contract(
+    left: IntArray, right: IntArray, limit: float, points: Array, parent: IntArray, follow: IntArray, last: IntArray
+) -> None:
     for at in range(len(left)):
-        p, q = _root(parent, left[at]), _root(parent, right[at])
+        p = _root(parent, left[at])
+        q = _root(parent, right[at])
         if p == q:
             continue
         near = True
@@ -319,17 +403,10 @@ def contract(left: IntArray, right: IntArray, limit: float, points: Array) -> In
         while i >= 0 and near:
             j = q
             while j >= 0:
-                if (
-                    (points[i, 0] - points[j, 0]) ** 2
-                    + (points[i, 1] - points[j, 1]) ** 2
-                    + (points[i, 2] - points[j, 2]) ** 2
-                ) > limit * limit:
+                if _square(points, i, j) > limit * limit:
                     near = False
                     break
                 j = follow[j]
             i = follow[i]
         if near:
             _join(p, q, parent, follow, last)
-    for i in range(n):
-        parent[i] = _root(parent, i)
-    return parent

@@ -15,10 +15,10 @@ PER_DIAGONAL = 64.0  # intervals on a side as long as the model's diagonal
 
 
 def four_sided_faces(topology: Topology, lengths: Array) -> list[int]:
-    """Faces with one loop of four edges that have a length: each is its own block."""
+    """Faces with one loop of four edges, at most one of them a pole: each is its own block."""
     faces = []
     for face, loops in enumerate(topology.loops):
-        if len(loops) == 1 and len(loops[0]) == 4 and all(lengths[use.edge] > 0.0 for use in loops[0]):
+        if len(loops) == 1 and len(loops[0]) == 4 and sum(lengths[use.edge] == 0.0 for use in loops[0]) <= 1:
             faces.append(face)
     return faces
 

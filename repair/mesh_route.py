@@ -14,11 +14,13 @@ import numpy as np
 
 from patchwright.models.arrays import Array, BoolArray
 from patchwright.models.assembly import Assembly, Part
+from patchwright.models.errors import GeometryError
 from patchwright.models.tolerance import Tolerance
 from patchwright.models.tree import Tree
 from patchwright.models.triangulation import Triangulation
 from patchwright.repair.deviation import Deviation, two_sided
 from patchwright.repair.faceting import faceting
+from patchwright.repair.last_resort import wrapped
 from patchwright.repair.mend import BRIDGED, CUT, KEPT, Mended, mend
 from patchwright.repair.network import PatchNetwork
 from patchwright.repair.network_seams import measure
@@ -27,11 +29,12 @@ from patchwright.repair.quad_layout import QuadLayout, quad_layout
 from patchwright.repair.result import Face, LedgerEntry, Point, Problem, Progress, Repaired, Rung, Seam, Verdict
 from patchwright.repair.resurface import resurface
 
-COVERAGE_GOAL = 0.99  # share of the area, both ways, within the fit tolerance
+COVERAGE_GOAL = 0.99  # share of the area, both ways, within the fit tolerance; below it a result has not converged
+COVERAGE_LEAST = 0.95  # below it a result is refused
 RETRIES = 2
 FINER = 2.0  # quads of each retry against the one before
 WIDEST = 10.0  # times: how far a fit tolerance nobody asked for may widen to the height of coarse facets
-TESSELLATION = 12  # intervals per patch side when the patches are measured or written as triangles
+CHORD = 0.25  # of the fit tolerance: how far a tessellation of the patches may stray from them
 GRID = 8  # intervals per patch side of the structured grid
 
 
@@ -56,18 +59,28 @@ def repair_mesh(
     """
     raw = assembly.triangulation
     mended = mend(raw, tolerance, openings=openings, progress=progress)
+    if mended.problems and scope == "all":
+        progress("wrapping", 0.0)
+        mended = wrapped(mended, raw, tolerance)
     ledger = _mending_ledger(assembly, mended)
     if mended.problems:
         problems = tuple(Problem(p.kind, _point(p.where), float(p.size), p.message) for p in mended.problems)
         return _refused(assembly, mended, ledger, problems)
     tolerance, resolution = _resolved(tolerance, mended.triangulation)
-    network, deviation, tries = _fit(mended, tolerance, layout, progress)
+    try:
+        network, deviation, tries = _fit(mended, tolerance, layout, progress)
+    except GeometryError as error:
+        middle = _point(mended.triangulation.bounds.mean(axis=0))
+        message = f"no layout of quads was found: {error}"
+        return _refused(assembly, mended, ledger, (Problem("layout", middle, raw.diagonal, message),))
+    if deviation.coverage < COVERAGE_LEAST:
+        return _refused(assembly, mended, ledger, (_uncovered(deviation),))
     seams = measure(network)
     faces = _faces(network, mended)
     invented = float(mended.triangulation.areas[mended.origin == BRIDGED].sum() / mended.triangulation.areas.sum())
     ledger += (_fitting_entry(network, mended, tolerance, tries, resolution),)
     if scope == "all":
-        tessellation = network.tessellate(TESSELLATION)
+        tessellation = network.tessellate(network.intervals_within(CHORD * tolerance.fit))
         tags = network.layout.tags[tessellation.tags] if tessellation.tags is not None else None
         triangulation = replace(tessellation, tags=tags, tag_names=mended.triangulation.tag_names)
     else:
@@ -114,10 +127,11 @@ def _fit(
         quads = quad_layout(body, target=wanted, angle=tolerance.angle) if isinstance(layout, str) else layout
         network = resurface(quads, target, tolerance, noise=mended.noise, progress=progress)
         progress("measuring coverage", 0.0)
-        skip = network_invented(network, TESSELLATION)
+        intervals = network.intervals_within(CHORD * tolerance.fit)
+        skip = network_invented(network, intervals)
         deviation = two_sided(
             body,
-            network.tessellate(TESSELLATION),
+            network.tessellate(intervals),
             tolerance.fit,
             skip_before=invented,
             skip_after=skip,
@@ -214,6 +228,16 @@ def _mending_ledger(assembly: Assembly, mended: Mended) -> tuple[LedgerEntry, ..
     return tuple(entries)
 
 
+def _uncovered(deviation: Deviation) -> Problem:
+    """The refusal of patches that leave too much of the surface beyond the tolerance."""
+    worst = min(deviation.input_to_output, deviation.output_to_input, key=lambda s: s.coverage)
+    message = (
+        f"the patches keep only {100.0 * worst.coverage:.1f} % of the surface within {worst.tolerance:.3g}; "
+        f"the farthest place is {worst.largest:.3g} away; give a wider --tolerance or mend that place by hand"
+    )
+    return Problem("coverage", worst.where, worst.largest, message)
+
+
 def _resolved(tolerance: Tolerance, body: Triangulation) -> tuple[Tolerance, float]:
     """The fit tolerance the data can carry, and the height of the data's facets.
 
@@ -258,6 +282,7 @@ def _figures(
         "openings kept": len(mended.openings),
         "noise": float(mended.noise),
         "coverage": deviation.coverage,
+        "converged": deviation.coverage >= COVERAGE_GOAL,
         "largest seam gap": max((s.gap for s in seams if s.kind != "free"), default=0.0),
         "largest smooth seam angle": float(smooth.max()),
         "median smooth seam angle": float(np.median(smooth)),

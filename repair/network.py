@@ -18,6 +18,9 @@ from patchwright.repair.patch_nets import PatchNets
 from patchwright.repair.quad_layout import QuadLayout
 from patchwright.repair.spline_space import DEGREE, knots
 
+FEWEST_INTERVALS = 12
+MOST_TRIANGLES = 2_000_000
+
 _UNIT = np.array([0.0, 0.0, 1.0, 1.0])
 # the sides of the unit square in the order of a quad's edges, each from its start to its end corner
 _CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
@@ -92,6 +95,20 @@ class PatchNetwork:
         points = self.nets.sample(intervals + 1)
         _put_sides(self.layout, points, self.edges.sample(intervals + 1)[:, 1:-1], self.layout.vertices)
         return points
+
+    def intervals_within(self, chord: float) -> int:
+        """Intervals per side at which 99 % of the patches' tessellations stay within `chord` of the patches.
+
+        At least `FEWEST_INTERVALS`, and no more than `MOST_TRIANGLES` triangles allow.
+        """
+        points = self.nets.sample(2 * FEWEST_INTERVALS + 1)
+        sag = np.zeros(len(self))
+        for line in (points, np.swapaxes(points, 1, 2)):
+            off = line[:, 1::2] - 0.5 * (line[:, :-1:2] + line[:, 2::2])
+            sag = np.maximum(sag, np.linalg.norm(off, axis=-1).max(axis=(1, 2)))
+        wanted = FEWEST_INTERVALS * np.sqrt(float(np.percentile(sag, 99.0)) / chord)
+        allowed = max(FEWEST_INTERVALS, int(np.sqrt(MOST_TRIANGLES / (2 * len(self)))))
+        return int(np.clip(np.ceil(wanted), FEWEST_INTERVALS, allowed))
 
     def tessellate(self, intervals: int) -> Triangulation:
         """Watertight triangles: vertices on shared edges are stored once; tag i is patch i, uv its parameters."""

@@ -128,6 +128,11 @@ class Repaired:
     network: PatchNetwork | None = None
     figures: dict[str, float | int | str | bool] = field(default_factory=dict)
 
+    @property
+    def converged(self) -> bool:
+        """Whether the fit reached its coverage; True where nothing was fitted."""
+        return bool(self.figures.get("converged", True))
+
     def to_assembly(self) -> Assembly:
         """The repaired faces with shared edges, ready for `patchwright.models.io.write`."""
         return self.assembly

@@ -18,7 +18,7 @@ FILES = ("repaired.step", "repaired.igs", "repaired.stl", "grid.xyz", "report.ht
 
 
 def dirty_sphere(seed=3):
-    clean = sphere().assembly.triangulation
+    clean = sphere().bodies[0].tessellate(density=4.0)  # facets no higher than the fit tolerance
     plain = Triangulation(clean.vertices, clean.triangles)
 
     def holes(t, *, seed):
@@ -63,9 +63,8 @@ def test_the_step_file_is_one_closed_shell_with_exact_seams(study):
 def test_the_patches_are_the_sphere(study):
     network = study.repaired.network
     radius = np.linalg.norm(network.nets.sample(9), axis=-1).reshape(-1)
-    clean = sphere().assembly.triangulation
-    mean = np.linalg.norm(clean.vertices, axis=1).mean()
-    assert np.percentile(np.abs(radius / mean - 1), 99) < 2e-3
+    true = np.linalg.norm(dirty_sphere()[0].vertices, axis=1).mean()
+    assert np.percentile(np.abs(radius / true - 1), 99) < 1e-3
     assert study.repaired.deviation.coverage > 0.99
 
 
@@ -107,7 +106,7 @@ def test_a_clean_model_comes_back_identical():
 def test_scope_all_gives_the_patches_own_triangles_within_the_fit_tolerance():
     clean, _ = dirty_sphere()
     repaired = repair(clean, scope="all")
-    assert len(repaired.triangulation) == 2 * 12 * 12 * len(repaired.faces)
+    assert len(repaired.triangulation) % (2 * len(repaired.faces)) == 0
     fit = Tolerance.of(clean).fit
     assert repaired.deviation.output_to_input.p99 <= fit
     assert repaired.deviation.input_to_output.p99 <= fit
