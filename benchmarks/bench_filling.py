@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+
 from patchwright.repair.filling import METHODS, fill
 
 SIDE = 41

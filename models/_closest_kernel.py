@@ -1,5 +1,6 @@
 """Kernel of the closest point on a NURBS surface: damped Newton steps inside the domain's box, one point after
 another."""
+# mypy: disable-error-code="untyped-decorator,no-any-return,no-untyped-def,no-untyped-call"
 
 from __future__ import annotations
 

@@ -4,6 +4,7 @@ A difference of two coordinates is two numbers, its rounded value and what round
 differences is a sum of products, kept as an expansion of numbers that do not overlap (Shewchuk, "Adaptive precision
 floating-point arithmetic", Discrete & Computational Geometry 18, 1997). Exact barring overflow and underflow.
 """
+# mypy: disable-error-code="untyped-decorator,no-any-return,no-untyped-def,no-untyped-call"
 
 from __future__ import annotations
 
@@ -56,35 +57,27 @@ def grow(expansion: Array, n: int, term: float) -> int:
 
 
 @njit(cache=True, nogil=True)
-def grow_product(expansion: Array, n: int, a: float, b: float, c: float) -> int:
-    """Add a b c to an expansion."""
-    p = a * b
-    e = two_product_tail(a, b, p)
-    for factor in (p, e):
-        if factor != 0.0 and c != 0.0:
-            q = factor * c
-            n = grow(expansion, n, two_product_tail(factor, c, q))
-            n = grow(expansion, n, q)
-    return n
-
-
-@njit(cache=True, nogil=True)
 def determinant(rows: Array, tails: Array) -> float:
     """det(rows + tails), (3, 3) each, with the sign it has in exact arithmetic."""
     expansion = np.empty(LONGEST)
+    part = np.empty(4)
     n = 0
-    for k in range(3):
-        for turn in range(2):
-            i, j = (k + 1) % 3, (k + 2) % 3
-            sign = 1.0
-            if turn:
-                i, j, sign = j, i, -1.0
-            for a in range(2):
-                x = (tails if a else rows)[0, k]
-                for b in range(2):
-                    y = (tails if b else rows)[1, i]
-                    for c in range(2):
-                        z = (tails if c else rows)[2, j]
-                        if x != 0.0 and y != 0.0 and z != 0.0:
-                            n = grow_product(expansion, n, x, y, sign * z)
+    # one flat loop whose length the compiler does not know: unrolled it would take it many seconds
+    for term in range(16 * rows.shape[0]):
+        k, a, b, c = term >> 4, (term >> 1) & 1, (term >> 2) & 1, (term >> 3) & 1
+        i, j = (k + 1) % 3, (k + 2) % 3
+        sign = 1.0
+        if term & 1:
+            i, j, sign = j, i, -1.0
+        x = tails[0, k] if a else rows[0, k]
+        y = tails[1, i] if b else rows[1, i]
+        z = sign * (tails[2, j] if c else rows[2, j])
+        if x == 0.0 or y == 0.0 or z == 0.0:
+            continue
+        p = x * y
+        e = two_product_tail(x, y, p)
+        part[1], part[3] = p * z, e * z
+        part[0], part[2] = two_product_tail(p, z, part[1]), two_product_tail(e, z, part[3])
+        for m in range(part.shape[0]):
+            n = grow(expansion, n, part[m])
     return expansion[n - 1] if n else 0.0

@@ -1,4 +1,5 @@
 """Kernels of `tree`: closest points of triangles, best first by the boxes of the tree (layout: `_tree_kernel`)."""
+# mypy: disable-error-code="untyped-decorator,no-any-return,no-untyped-def,no-untyped-call"
 
 from __future__ import annotations
 

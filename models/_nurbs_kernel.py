@@ -5,6 +5,7 @@ U[i] <= u < U[i+1]. Basis rows are raised degree by degree (A2.2); a derivative 
 with the derivative formula (2.9) instead, so no triangular tables are kept. Nets are homogeneous, (x w, y w, z w,
 w), or plain.
 """
+# mypy: disable-error-code="untyped-decorator,no-any-return,no-untyped-def,no-untyped-call"
 
 from __future__ import annotations
 

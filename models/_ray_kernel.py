@@ -1,4 +1,5 @@
 """Kernels of `tree`: watertight rays and segments against the tree (layout: `_tree_kernel`)."""
+# mypy: disable-error-code="untyped-decorator,no-any-return,no-untyped-def,no-untyped-call"
 
 from __future__ import annotations
 
@@ -40,32 +41,25 @@ def ray_frame(direction: Array) -> tuple[int, int, int, float, float]:
 
 
 @njit(cache=True, nogil=True)
-def exact_edge(corners: Array, i: int, p: int, q: int, origins: Array, r: int, frame: Array) -> float:
-    """The edge function of corners p and q of row i against ray r, with the sign it has in exact arithmetic."""
+def exact(corners: Array, i: int, what: int, points: Array, r: int, frame: Array) -> float:
+    """An edge function of row i against ray r (`what` 0, 1, 2: opposite that corner) or the side r lies on (`what` 3).
+
+    A number with the sign of exact arithmetic. The direction is `frame[0]` plus its rounding `frame[1]`.
+    """
     rows = np.empty((3, 3))
     tails = np.empty((3, 3))
     largest = 0.0
-    for k in range(3):
-        rows[0, k] = corners[i, 3 * p + k] - origins[r, k]
-        tails[0, k] = difference_tail(corners[i, 3 * p + k], origins[r, k], rows[0, k])
-        rows[1, k] = corners[i, 3 * q + k] - origins[r, k]
-        tails[1, k] = difference_tail(corners[i, 3 * q + k], origins[r, k], rows[1, k])
-        rows[2, k], tails[2, k] = frame[0, k], frame[1, k]
-        if abs(frame[0, k]) > abs(largest):
-            largest = frame[0, k]
-    return determinant(rows, tails) / largest
-
-
-@njit(cache=True, nogil=True)
-def exact_side(corners: Array, i: int, points: Array, r: int) -> float:
-    """det of row i's corners seen from point r: its sign is exact, zero in the triangle's plane."""
-    rows = np.empty((3, 3))
-    tails = np.empty((3, 3))
-    for j in range(3):
+    for j in range(rows.shape[0]):
+        corner = j if what == 3 else (what + 2 - j) % 3
         for k in range(3):
-            rows[j, k] = corners[i, 3 * j + k] - points[r, k]
-            tails[j, k] = difference_tail(corners[i, 3 * j + k], points[r, k], rows[j, k])
-    return determinant(rows, tails)
+            if j == 2 and what < 3:
+                rows[j, k], tails[j, k] = frame[0, k], frame[1, k]
+                if abs(frame[0, k]) > abs(largest):
+                    largest = frame[0, k]
+            else:
+                rows[j, k] = corners[i, 3 * corner + k] - points[r, k]
+                tails[j, k] = difference_tail(corners[i, 3 * corner + k], points[r, k], rows[j, k])
+    return determinant(rows, tails) / (largest if what < 3 else 1.0)
 
 
 @njit(cache=True, nogil=True)
@@ -73,13 +67,16 @@ def settle(
     corners: Array, i: int, origins: Array, r: int, frame: Array, u: float, v: float, w: float, error: float
 ) -> tuple[float, float, float, float]:
     """`ray_triangle` in exact arithmetic: edge functions within their rounding `error` of zero, and the depth."""
-    u = u if abs(u) > error else exact_edge(corners, i, 2, 1, origins, r, frame)
-    v = v if abs(v) > error else exact_edge(corners, i, 0, 2, origins, r, frame)
-    w = w if abs(w) > error else exact_edge(corners, i, 1, 0, origins, r, frame)
+    value = np.empty(4)
+    value[0], value[1], value[2], value[3] = u, v, w, 0.0
+    for what in range(value.shape[0]):
+        if abs(value[what]) <= error:
+            value[what] = exact(corners, i, what, origins, r, frame)
+    u, v, w = value[0], value[1], value[2]
     total = u + v + w
     if total == 0.0 or (min(min(u, v), w) < 0.0 and max(max(u, v), w) > 0.0):
         return np.nan, 0.0, 0.0, 0.0
-    return -exact_side(corners, i, origins, r) / total, u / total, v / total, w / total
+    return -value[3] / total, u / total, v / total, w / total
 
 
 @njit(cache=True, nogil=True, forceinline=True)
@@ -112,7 +109,7 @@ def ray_triangle(
 
 
 @njit(cache=True, nogil=True)
-def inverse(x: float) -> float:
+def inverse(x: float) -> np.float32:
     """1 / x in single precision, finite."""
     return np.float32(1.0 / x if abs(x) * HUGE > 1.0 else HUGE)
 
@@ -130,8 +127,17 @@ def approach(px: float, py: float, pz: float, dx: float, dy: float, dz: float, r
 
 @njit(cache=True, nogil=True, forceinline=True)
 def entry(
-    boxes: Boxes, node: int, at: int, px: float, py: float, pz: float, ix: float, iy: float, iz: float, best: float
-) -> float:
+    boxes: Boxes,
+    node: int,
+    at: int,
+    px: np.float32,
+    py: np.float32,
+    pz: np.float32,
+    ix: np.float32,
+    iy: np.float32,
+    iz: np.float32,
+    best: np.float32,
+) -> np.float32:
     """Where a ray enters a box, from below, in single precision; inf if it misses it or comes later than `best`."""
     x0, x1 = (boxes[node, at] - px) * ix, (boxes[node, at + 3] - px) * ix
     y0, y1 = (boxes[node, at + 1] - py) * iy, (boxes[node, at + 4] - py) * iy
@@ -181,7 +187,7 @@ def first_hits(
         longest = abs(frame[0, kz])
         sign = 1.0 if frame[0, kz] > 0.0 else -1.0
         best = reach[r % reach.shape[0]] / length
-        found = -1
+        found = np.int64(-1)
         wa, wb, wc = 0.0, 0.0, 0.0
         dx, dy, dz = frame[0, 0] / longest, frame[0, 1] / longest, frame[0, 2] / longest
         x, y, z = starts[row, 0] - center[0], starts[row, 1] - center[1], starts[row, 2] - center[2]
@@ -201,8 +207,8 @@ def first_hits(
                 continue
             node = stack[top]
             while node >= 0:
-                left = entry(boxes, node, 0, px, py, pz, ix, iy, iz, limit)
-                right = entry(boxes, node, 6, px, py, pz, ix, iy, iz, limit)
+                left = entry(boxes, node, np.int64(0), px, py, pz, ix, iy, iz, limit)
+                right = entry(boxes, node, np.int64(6), px, py, pz, ix, iy, iz, limit)
                 if min(left, right) == NONE:
                     break
                 if left <= right:
@@ -270,7 +276,7 @@ def all_hits(
             for i in range(code >> 3, (code >> 3) + (code & 7)):
                 t, u, v, w = ray_triangle(corners, i, start, r, frame, kx, ky, kz, sx, sy)
                 t /= frame[0, kz]
-                if 1.0 < t < 1.0 + ROUNDING and exact_side(corners, i, end, r) == 0.0:
+                if 1.0 < t < 1.0 + ROUNDING and exact(corners, i, 3, end, r, frame) == 0.0:
                     t = 1.0
                 if not 0.0 <= t <= 1.0:
                     continue

@@ -5,6 +5,7 @@ of the right child; float32 about `center`, padded by more than any rounding her
 `child[i]`: an inner node c >= 0, or -(8 first + count) - 1 for a leaf of `count` triangles from row `first` of
 `corners` (k, 9), which are float64 in the model's own frame; `index` gives their number in the triangulation.
 """
+# mypy: disable-error-code="untyped-decorator,no-any-return,no-untyped-def,no-untyped-call"
 
 from __future__ import annotations
 
@@ -23,53 +24,74 @@ DEEPEST = 48  # below this depth ranges are halved, so that no tree is deeper th
 STACK = 160
 
 
-@njit(cache=True, nogil=True)
 def bounds(vertices: Array, triangles: IntArray) -> tuple[Array, Array]:
     """Lowest and highest coordinates of the triangles' corners; zeros without triangles."""
-    low, high = np.zeros(3), np.zeros(3)
-    for t in range(triangles.shape[0]):
-        for j in range(3):
-            for k in range(3):
-                x = vertices[triangles[t, j], k]
-                low[k] = x if t + j == 0 else min(low[k], x)
-                high[k] = x if t + j == 0 else max(high[k], x)
-    return low, high
+    box = np.zeros((2, 3))
+    if len(triangles):
+        box[:] = vertices[triangles[0, 0]]
+        _bounds(vertices, triangles, box)
+    return box[0], box[1]
 
 
 @njit(cache=True, nogil=True)
+def _bounds(vertices: Array, triangles: IntArray, box: Array) -> None:
+    """Widen `box` (2, 3) by the triangles' corners."""
+    for t in range(triangles.shape[0]):
+        for j in range(3):
+            v = triangles[t, j]
+            for k in range(3):
+                x = vertices[v, k]
+                if x < box[0, k]:
+                    box[0, k] = x
+                if x > box[1, k]:
+                    box[1, k] = x
+
+
 def primitive_boxes(vertices: Array, triangles: IntArray, center: Array, pad: float) -> Boxes:
     """(m, 6) boxes of the triangles about `center`, padded."""
-    m = triangles.shape[0]
-    boxes = np.empty((m, 6), np.float32)
-    for t in range(m):
-        a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
-        for k in range(3):
-            x, y, z = vertices[a, k], vertices[b, k], vertices[c, k]
-            boxes[t, k] = np.float32(min(min(x, y), z) - center[k] - pad)
-            boxes[t, k + 3] = np.float32(max(max(x, y), z) - center[k] + pad)
+    boxes = np.empty((len(triangles), 6), np.float32)
+    _primitive_boxes(vertices, triangles, center, pad, boxes)
     return boxes
 
 
 @njit(cache=True, nogil=True)
-def clear(box: Boxes) -> None:
-    """Make `box` (6,) the empty box."""
-    for k in range(3):
-        box[k] = np.inf
-        box[k + 3] = -np.inf
+def _primitive_boxes(vertices: Array, triangles: IntArray, center: Array, pad: float, boxes: Boxes) -> None:
+    for t in range(triangles.shape[0]):
+        a = triangles[t, 0]
+        b = triangles[t, 1]
+        c = triangles[t, 2]
+        for k in range(3):
+            x = vertices[a, k]
+            y = vertices[b, k]
+            z = vertices[c, k]
+            boxes[t, k] = np.float32(min(min(x, y), z) - center[k] - pad)
+            boxes[t, k + 3] = np.float32(max(max(x, y), z) - center[k] + pad)
 
 
 @njit(cache=True, nogil=True)
-def widen(box: Boxes, by: Boxes) -> None:
-    """Make `box` (6,) hold the box `by`."""
+def clear(boxes: Boxes, i: int) -> None:
+    """Make row i of `boxes` (n, 6) the empty box."""
     for k in range(3):
-        box[k] = min(box[k], by[k])
-        box[k + 3] = max(box[k + 3], by[k + 3])
+        boxes[i, k] = np.inf
+        boxes[i, k + 3] = -np.inf
 
 
 @njit(cache=True, nogil=True)
-def half_area(box: Boxes) -> float:
-    """Half the surface of a box."""
-    dx, dy, dz = box[3] - box[0], box[4] - box[1], box[5] - box[2]
+def widen(boxes: Boxes, i: int, by: Boxes, j: int) -> None:
+    """Make box i of `boxes` hold box j of `by`."""
+    for k in range(3):
+        low = by[j, k]
+        high = by[j, k + 3]
+        boxes[i, k] = low if low < boxes[i, k] else boxes[i, k]
+        boxes[i, k + 3] = high if high > boxes[i, k + 3] else boxes[i, k + 3]
+
+
+@njit(cache=True, nogil=True)
+def half_area(boxes: Boxes, i: int) -> float:
+    """Half the surface of box i."""
+    dx = boxes[i, 3] - boxes[i, 0]
+    dy = boxes[i, 4] - boxes[i, 1]
+    dz = boxes[i, 5] - boxes[i, 2]
     return dx * dy + dy * dz + dz * dx
 
 
@@ -79,54 +101,59 @@ def partition(
 ) -> int:
     """Permute the boxes begin..end at the best of 15 planes; where the right half begins, `begin` if none parts them.
 
-    `halves` (2, 6) become the boxes of the two halves.
+    `halves` (3, 6) become the boxes of the two halves; its third row is scratch.
     """
-    low = np.empty(3, np.float32)
-    high = np.empty(3, np.float32)
-    for k in range(3):
-        low[k] = np.inf
-        high[k] = -np.inf
+    clear(halves, np.int64(2))  # of twice the centres
     for i in range(begin, end):
         for k in range(3):
             c = boxes[i, k] + boxes[i, k + 3]
-            low[k] = min(low[k], c)
-            high[k] = max(high[k], c)
+            halves[2, k] = c if c < halves[2, k] else halves[2, k]
+            halves[2, k + 3] = c if c > halves[2, k + 3] else halves[2, k + 3]
     axis = 0
+    origin = halves[2, 0]
+    longest = halves[2, 3] - origin
     for k in range(1, 3):
-        if high[k] - low[k] > high[axis] - low[axis]:
+        if halves[2, k + 3] - halves[2, k] > longest:
             axis = k
-    if not high[axis] > low[axis]:
+            origin = halves[2, k]
+            longest = halves[2, k + 3] - origin
+    if not longest > 0.0:
         return begin
-    scale = np.float32(0.99999 * BINS) / (high[axis] - low[axis])
-    origin = low[axis]
+    scale = np.float32(0.99999 * BINS) / longest
     for b in range(BINS):
         count[b] = 0
-        clear(bins[b])
+        clear(bins, b)
     for i in range(begin, end):
-        b = min(int((boxes[i, axis] + boxes[i, axis + 3] - origin) * scale), BINS - 1)
-        count[b] += 1
-        widen(bins[b], boxes[i])
-    clear(halves[1])
+        slot = np.int64((boxes[i, axis] + boxes[i, axis + 3] - origin) * scale)
+        if slot >= BINS:
+            slot = np.int64(BINS - 1)
+        count[slot] += 1
+        widen(bins, slot, boxes, i)
+    for half in range(2):
+        clear(halves, half)
+    lower, upper = np.int64(0), np.int64(1)  # plain numbers would be types of their own, and compile `widen` again
     for b in range(BINS - 1, 0, -1):
-        widen(halves[1], bins[b])
-        area[b] = half_area(halves[1])
-    clear(halves[0])
-    left, cut, best = 0, 0, np.inf
+        widen(halves, upper, bins, b)
+        area[b] = half_area(halves, upper)
+    left = 0
+    cut = 0
+    best = np.inf
     for b in range(BINS - 1):
-        widen(halves[0], bins[b])
+        widen(halves, lower, bins, b)
         left += count[b]
-        if 0 < left < end - begin:
-            cost = half_area(halves[0]) * left + area[b + 1] * (end - begin - left)
+        if left > 0 and left < end - begin:
+            cost = half_area(halves, lower) * left + area[b + 1] * (end - begin - left)
             if cost < best:
                 best = cost
                 cut = b + 1
-    for half in range(2):
-        clear(halves[half])
+    for side in range(2):
+        clear(halves, side)
     for b in range(BINS):
-        widen(halves[0 if b < cut else 1], bins[b])
-    split, last = begin, end - 1
+        widen(halves, 0 if b < cut else 1, bins, b)
+    split = begin
+    last = end - 1
     while split <= last:
-        if min(int((boxes[split, axis] + boxes[split, axis + 3] - origin) * scale), BINS - 1) < cut:
+        if np.int64((boxes[split, axis] + boxes[split, axis + 3] - origin) * scale) < cut:
             split += 1
             continue
         i = order[split]
@@ -140,29 +167,47 @@ def partition(
     return split
 
 
-@njit(cache=True, nogil=True)
 def build(boxes: Boxes) -> tuple[Boxes, Index, Index]:
     """Top-down build by the surface-area heuristic on 16 bins of the longest axis of the box centres.
 
     Returns the nodes' boxes (n, 12), children (n, 2) and the order of the triangles in the leaves. `boxes` is permuted.
     """
-    m = boxes.shape[0]
-    order = np.empty(m, np.int32)
-    for i in range(m):
-        order[i] = i
+    m = len(boxes)
+    order = np.arange(m, dtype=np.int32)
     node_boxes = np.empty((max(m, 1), 12), np.float32)
     child = np.empty((max(m, 1), 2), np.int32)
-    stack = np.empty((STACK, 4), np.int64)  # begin, end, 2 parent + side, depth
-    count = np.empty(BINS, np.int64)
-    area = np.empty(BINS, np.float64)
-    bins = np.empty((BINS, 6), np.float32)
-    halves = np.empty((2, 6), np.float32)
+    nodes = _build(
+        boxes, order, node_boxes, child, np.empty((STACK, 4), np.int64), np.empty((BINS, 6), np.float32),
+        np.empty(BINS, np.int64), np.empty(BINS), np.empty((3, 6), np.float32),
+    )  # fmt: skip
+    return node_boxes[:nodes].copy(), child[:nodes].copy(), order
+
+
+@njit(cache=True, nogil=True)
+def _build(
+    boxes: Boxes,
+    order: Index,
+    node_boxes: Boxes,
+    child: Index,
+    stack: IntArray,
+    bins: Boxes,
+    count: IntArray,
+    area: Array,
+    halves: Boxes,
+) -> int:
+    """The number of nodes; rows of `stack`: begin, end, 2 parent + side, depth."""
     nodes = 0
-    stack[0, 0], stack[0, 1], stack[0, 2], stack[0, 3] = 0, m, -1, 0
+    stack[0, 0] = 0
+    stack[0, 1] = boxes.shape[0]
+    stack[0, 2] = -1
+    stack[0, 3] = 0
     top = 1
     while top:
         top -= 1
-        begin, end, link, depth = stack[top, 0], stack[top, 1], stack[top, 2], stack[top, 3]
+        begin = stack[top, 0]
+        end = stack[top, 1]
+        link = stack[top, 2]
+        depth = stack[top, 3]
         if link >= 0:
             if end - begin <= LEAF:
                 child[link >> 1, link & 1] = -(8 * begin + (end - begin)) - 1
@@ -172,11 +217,11 @@ def build(boxes: Boxes) -> tuple[Boxes, Index, Index]:
         if end - begin > LEAF and depth < DEEPEST:
             split = partition(boxes, order, begin, end, bins, count, area, halves)
         if split == begin:
-            split = end if end - begin <= LEAF else (begin + end) // 2  # a tree of one leaf has an empty right child
+            split = end if end - begin <= LEAF else (begin + end) >> 1  # a tree of one leaf has an empty right child
             for half in range(2):
-                clear(halves[half])
+                clear(halves, half)
             for i in range(begin, end):
-                widen(halves[0 if i < split else 1], boxes[i])
+                widen(halves, 0 if i < split else 1, boxes, i)
         for half in range(2):
             for k in range(6):
                 node_boxes[nodes, 6 * half + k] = halves[half, k]
@@ -186,7 +231,7 @@ def build(boxes: Boxes) -> tuple[Boxes, Index, Index]:
             stack[top, 3] = depth + 1
             top += 1
         nodes += 1
-    return node_boxes[:nodes], child[:nodes], order
+    return nodes
 
 
 @njit(cache=True, nogil=True)
@@ -229,7 +274,7 @@ def morton_order(points: Array, otherwise: Array, least: float) -> IntArray:
     for i in range(n):
         for k in range(3):
             x = np.int64((points[i, k] - low[k]) * scale)
-            x = (x | (x << 16)) & 0x030000FF
+            x = (x | (x << 16)) & 0x030000FF  # three bits apart
             x = (x | (x << 8)) & 0x0300F00F
             x = (x | (x << 4)) & 0x030C30C3
             code[i] |= ((x | (x << 2)) & 0x09249249) << k
@@ -250,15 +295,25 @@ def morton_order(points: Array, otherwise: Array, least: float) -> IntArray:
     return order
 
 
-@njit(cache=True, nogil=True)
 def exact_boxes(corners: Array) -> Array:
     """(m, 6) boxes of the triangles in the order of the leaves, not padded."""
-    boxes = np.empty((corners.shape[0], 6))
+    boxes = np.empty((len(corners), 6))
+    _exact_boxes(corners, boxes)
+    return boxes
+
+
+@njit(cache=True, nogil=True)
+def _exact_boxes(corners: Array, boxes: Array) -> None:
     for i in range(corners.shape[0]):
         for k in range(3):
-            boxes[i, k] = min(corners[i, k], corners[i, 3 + k], corners[i, 6 + k])
-            boxes[i, k + 3] = max(corners[i, k], corners[i, 3 + k], corners[i, 6 + k])
-    return boxes
+            low = corners[i, k]
+            high = low
+            for j in range(3, 9, 3):
+                x = corners[i, j + k]
+                low = x if x < low else low
+                high = x if x > high else high
+            boxes[i, k] = low
+            boxes[i, k + 3] = high
 
 
 @njit(cache=True, nogil=True)
@@ -332,12 +387,11 @@ def overlapping(
                 if filled == capacity:
                     capacity *= 2
                     grown = np.empty((capacity, 2), np.int64)
-                    for p in range(filled):
-                        grown[p, 0], grown[p, 1] = pairs[p, 0], pairs[p, 1]
+                    for row in range(filled):
+                        grown[row, 0], grown[row, 1] = pairs[row, 0], pairs[row, 1]
                     pairs = grown
-                p, q = np.int64(a_index[i]), np.int64(b_index[j])
-                if own and p > q:
-                    p, q = q, p
-                pairs[filled, 0], pairs[filled, 1] = p, q
+                first, second = np.int64(a_index[i]), np.int64(b_index[j])
+                swap = own and first > second
+                pairs[filled, 0], pairs[filled, 1] = second if swap else first, first if swap else second
                 filled += 1
     return pairs[:filled].copy()

@@ -6,6 +6,7 @@ exactly (`_exact_kernel`).
 The test follows Guigue & Devillers, "Fast and robust triangle-triangle overlap test using orientation predicates",
 Journal of Graphics Tools 8(1), 2003, in three dimensions, and separating edges where the triangles are coplanar.
 """
+# mypy: disable-error-code="untyped-decorator,no-any-return,no-untyped-def,no-untyped-call"
 
 from __future__ import annotations
 
@@ -248,21 +249,33 @@ def stretch(p: Array, sign: Array, out: Array) -> None:
 
 @njit(cache=True, nogil=True)
 def segments(
-    a_vertices: Array, a_triangles: IntArray, b_vertices: Array, b_triangles: IntArray, pairs: IntArray
+    a_vertices: Array,
+    a_triangles: IntArray,
+    b_vertices: Array,
+    b_triangles: IntArray,
+    pairs: IntArray,
+    cross: BoolArray,
 ) -> Array:
-    """(k, 2, 3) ends of the stretch two triangles share; NaN where they do not cross or lie in one plane."""
-    p, q, u, v = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
+    """(k, 2, 3) ends of the stretch two triangles share; NaN where they do not `cross` or lie in one plane."""
+    p, q = np.empty((3, 3)), np.empty((3, 3))
     above, beside = np.empty(3), np.empty(3)
     shared = np.empty(3, np.int64)
     ends = np.empty((4, 3))
     at = np.empty(4)
     result = np.full((pairs.shape[0], 2, 3), np.nan)
     for n in range(pairs.shape[0]):
+        if not cross[n]:
+            continue
         fetch(a_vertices, a_triangles, pairs[n, 0], p)
         fetch(b_vertices, b_triangles, pairs[n, 1], q)
-        if dominant(p) < 0 or dominant(q) < 0 or not meet(p, q, True, above, beside, u, v, shared):
-            continue
-        if above[0] == 0.0 and above[1] == 0.0 and above[2] == 0.0:
+        same_corners(p, q, shared)
+        low, high = np.inf, -np.inf
+        for j in range(3):
+            above[j] = 0.0 if shared[j] >= 0 else orient3d(p[0], p[1], p[2], q[j])
+            common = shared[0] == j or shared[1] == j or shared[2] == j
+            beside[j] = 0.0 if common else orient3d(q[0], q[1], q[2], p[j])
+            low, high = min(low, above[j]), max(high, above[j])
+        if low == 0.0 and high == 0.0:
             continue
         stretch(p, beside, ends[:2])
         stretch(q, above, ends[2:])

@@ -1,5 +1,7 @@
 """Kernels of `winding`: moments of the tree's nodes and the sum of solid angles, far nodes by their moments."""
 
+# mypy: disable-error-code="untyped-decorator,no-any-return,no-untyped-def,no-untyped-call"
+
 from __future__ import annotations
 
 import numpy as np

@@ -77,7 +77,8 @@ def intersection_segments(a: Triangulation, b: Triangulation, pairs: npt.ArrayLi
     """
     from patchwright.models._triangle_triangle_kernel import segments
 
-    found: Array = segments(a.vertices, a.triangles, b.vertices, b.triangles, _checked(a, b, pairs))
+    index, cross = _checked(a, b, pairs), pairs_intersect(a, b, pairs, proper=True)
+    found: Array = segments(a.vertices, a.triangles, b.vertices, b.triangles, index, cross)
     return found
 
 

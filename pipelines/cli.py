@@ -1,7 +1,7 @@
 """The command line: `patchwright check | repair | convert | run | demo`.
 
-Only here do errors become sentences and exit codes: 0 done, 1 defects found, refused or not converged, 2 bad usage or input,
-3 internal failure. Heavy packages are imported inside the commands, so that `--help` answers at once.
+Only here do errors become sentences and exit codes: 0 done, 1 defects found, refused or not converged, 2 bad usage or
+input, 3 internal failure. Heavy packages are imported inside the commands, so that `--help` answers at once.
 """
 
 from __future__ import annotations

@@ -17,6 +17,14 @@ import numpy as np
 SIZE = (1400, 900)
 DIRECTION = (-1.0, -1.6, 0.9)  # from the model to the eye
 MARGIN = 1.12
+BAR = {
+    "title_font_size": 18,
+    "label_font_size": 15,
+    "width": 0.4,
+    "height": 0.07,
+    "position_x": 0.3,
+    "position_y": 0.03,
+}
 BACKGROUND = "#ffffff"
 
 
@@ -68,7 +76,7 @@ def _add(plotter: Any, pv: Any, layer: dict[str, Any], arrays: dict[str, Any]) -
         options: dict[str, Any] = {"smooth_shading": False, "ambient": 0.25, "diffuse": 0.75, "specular": 0.1}
         if f"{key}.values" in arrays:
             mesh.cell_data["values"] = arrays[f"{key}.values"]
-            bar = {"title": layer.get("bar", ""), "color": "#222222", "n_labels": 5, "fmt": "%.1e"}
+            bar = {"title": layer.get("bar", "") + "\n", "color": "#222222", "n_labels": 5, "fmt": "%.1e", **BAR}
             plotter.add_mesh(
                 mesh, scalars="values", cmap="viridis", clim=layer.get("range"), scalar_bar_args=bar, **options
             )

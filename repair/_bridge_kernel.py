@@ -6,6 +6,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 from numba import njit
+
 from patchwright.models.arrays import Array, BoolArray, IntArray
 
 Bytes = npt.NDArray[np.uint8]
@@ -56,7 +57,9 @@ def fill_loop(points: Array, normals: Array, forbidden: BoolArray) -> IntArray:
     cost[at, at + 1] = 0.0
     facing[at, at + 1] = normals[:-1]
     triangles = np.empty((n - 2, 3), dtype=np.int64)
-    _fill_loop(points, normals, forbidden, cost, split, facing, np.zeros(3), np.empty((n, 2), dtype=np.int64), triangles)
+    _fill_loop(
+        points, normals, forbidden, cost, split, facing, np.zeros(3), np.empty((n, 2), dtype=np.int64), triangles
+    )
     return triangles if np.isfinite(cost[0, n - 1]) else np.empty((0, 3), dtype=np.int64)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
+
 from patchwright.models.arrays import Array, IntArray
 
 
@@ -58,7 +59,7 @@ def _nearest_edges(
             a = start[e]
             b = end[e]
             c = apex[e]
-            if v == a or v == b or v == c:
+            if v == a or v == b or v == c:  # noqa: SIM109  (a tuple costs compile time)
                 continue
             ab = 0.0
             ap = 0.0

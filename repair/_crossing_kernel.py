@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
+
 from patchwright.models.arrays import Array, BoolArray, IntArray
 
 
@@ -85,7 +86,7 @@ def _crossing(pairs: IntArray, points: Array, triangles: IntArray, depth: float,
                     yours = j
         if shared > 1:
             continue
-        for turn in range(2):  # edges of the first against the second, then the other way
+        for _ in range(2):  # edges of the first against the second, then the other way
             a = triangles[t, 0]
             b = triangles[t, 1]
             c = triangles[t, 2]

@@ -1,5 +1,7 @@
 """Kernels of `features`: normals that noise and needles do not turn, chains of feature edges, regions between them."""
 
+# mypy: disable-error-code="untyped-decorator,no-any-return,no-untyped-def,no-untyped-call"
+
 from __future__ import annotations
 
 import numpy as np
@@ -22,7 +24,7 @@ def straightness(points, i, j, k):
     return (ax * bx + ay * by + az * bz) / size if size > 0.0 else 1.0
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, no_cfunc_wrapper=True)
 def settle_needles(order, neighbours, longest, height, threshold, normals):
     """Give a triangle flatter than `threshold` the normal of the neighbour across its longest side.
 
@@ -45,7 +47,7 @@ def settle_needles(order, neighbours, longest, height, threshold, normals):
                 normals[i, c] = normals[best, c]
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy", no_cfunc_wrapper=True)
 def filter_normals(triangles, offsets, fans, areas, noisy, width, rounds, normals):
     """Average each noisy triangle's normal over its one-ring.
 
@@ -74,7 +76,7 @@ def filter_normals(triangles, offsets, fans, areas, noisy, width, rounds, normal
                 old[i, c] = normals[i, c]
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy", no_cfunc_wrapper=True)
 def grow_ends(points, ends, offsets, incident, strong, weak):
     """Carry on each loose end of the strong edges along weak ones that go straight on; `strong` is changed in place."""
     degree = np.zeros(len(offsets) - 1, dtype=np.int64)
@@ -110,7 +112,7 @@ def grow_ends(points, ends, offsets, incident, strong, weak):
             came = best
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy", no_cfunc_wrapper=True)
 def trace(ends, offsets, incident, stop):
     """Chains of edges between `stop` vertices, and rings without one.
 
@@ -158,7 +160,7 @@ def trace(ends, offsets, incident, stop):
     return starts[: chains + 1], walked_vertices[: n + chains], walked_edges[:n], chain
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, no_cfunc_wrapper=True)
 def turning(points, starts, vertices, reach, turn):
     """Into `turn` (as `vertices`) the cosine of the turn at every inner chain vertex, seen over at least `reach`.
 
@@ -207,7 +209,7 @@ def turning(points, starts, vertices, reach, turn):
                 j += 1
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy", no_cfunc_wrapper=True)
 def regions(neighbours, blocked):
     """(m,) number of the piece each triangle lies in, pieces being parted by blocked sides."""
     label = np.full(len(neighbours), -1, dtype=np.int64)

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
+
 from patchwright.models.arrays import BoolArray, IntArray
 
 

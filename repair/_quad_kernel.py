@@ -3,6 +3,8 @@
 Quads live in a `Mesh` too, of which only the vertex arrays are used.
 """
 
+# mypy: disable-error-code="untyped-decorator,no-any-return,no-untyped-def,no-untyped-call"
+
 from __future__ import annotations
 
 import numpy as np
@@ -21,7 +23,7 @@ from patchwright.repair._surface_walk_kernel import inner, walk
 _UNPAIRED = 0.55  # score of two triangles left alone: they become six quads as good as those of a pair of this score
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, no_cfunc_wrapper=True)
 def curve_sides_of_edges(m, g, count, arcs):
     """Into arcs (count, 3, 2) the arc lengths of the first and second end of every side that lies on a curve."""
     T = m.T
@@ -34,7 +36,7 @@ def curve_sides_of_edges(m, g, count, arcs):
                 arcs[t, k, 1] = arc_at(m, g, b, c, a)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy", no_cfunc_wrapper=True)
 def match(neighbours, score, order):
     """(m,) partner side of each triangle or -1: greedily by score, then by swaps that raise the sum."""
     m = len(neighbours)
@@ -94,31 +96,33 @@ def match(neighbours, score, order):
     return partner
 
 
-@njit(cache=True, nogil=True)
-def place_new(m, g, first, parents, regions, curves, arcs, normals):
-    """Put vertices `first`... at the mean of their parents, on their curve or on the surface of their region."""
-    X = m.X
+@njit(cache=True, nogil=True, error_model="numpy", no_cfunc_wrapper=True)
+def land(m, g, parents, regions, points, normals, out, triangle):
+    """Points (n, k, 3) of each row put on the surface of its region, walked to from its parents (n, j), -1 none.
+
+    Where no walk can start, the point itself and triangle -1.
+    """
     starts = np.empty(128, dtype=np.int64)
     for i in range(len(parents)):
-        v = first + i
-        if curves[i] >= 0:
-            place_on_curve(m, g, v, curves[i], 0.5 * (arcs[i, 0] + arcs[i, 1]))
-            continue
-        n, count = np.int64(0), 0
-        x, y, z = 0.0, 0.0, 0.0
+        n = np.int64(0)
         for j in range(parents.shape[1]):
-            p = parents[i, j]
-            if p < 0:
-                continue
-            n = starts_of(m, g, p, regions[i], starts, n)
-            x, y, z = x + X[p, 0], y + X[p, 1], z + X[p, 2]
-            count += 1
-        x, y, z = x / count, y / count, z / count
-        sx, sy, sz, at = put_on(x, y, z, normals[i, 0], normals[i, 1], normals[i, 2], starts, n, g)
-        if at >= 0:
-            place_on_ground(m, g, v, sx, sy, sz, at)
+            if parents[i, j] >= 0:
+                n = starts_of(m, g, parents[i, j], regions[i], starts, n)
+        for j in range(points.shape[1]):
+            x, y, z = points[i, j, 0], points[i, j, 1], points[i, j, 2]
+            x, y, z, at = put_on(x, y, z, normals[i, 0], normals[i, 1], normals[i, 2], starts, n, g)
+            out[i, j, 0], out[i, j, 1], out[i, j, 2] = x, y, z
+            triangle[i, j] = at
+
+
+@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, no_cfunc_wrapper=True)
+def place_new(m, g, first, curves, arcs, points, triangles):
+    """Record vertices `first`...: at the middle of `arcs` on their curve, or at `points` in ground triangles."""
+    for i in range(len(curves)):
+        if curves[i] >= 0:
+            place_on_curve(m, g, first + i, curves[i], 0.5 * (arcs[i, 0] + arcs[i, 1]))
         else:
-            place_on_ground(m, g, v, x, y, z, m.vt[parents[i, 0]])
+            place_on_ground(m, g, first + i, points[i, 0], points[i, 1], points[i, 2], triangles[i])
 
 
 @inner
@@ -157,7 +161,7 @@ def quad_quality(m, q, quads, outward):
     return min(worst, 0.0) if turned else worst
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, no_cfunc_wrapper=True)
 def all_qualities(m, quads, outward, out):
     for q in range(len(quads)):
         out[q] = quad_quality(m, q, quads, outward)
@@ -178,7 +182,7 @@ def try_place(m, g, v, x, y, z):
     place_on_ground(m, g, v, x, y, z, at)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, no_cfunc_wrapper=True)
 def smooth_quads(m, g, quads, outward, offsets, around, near_offsets, near, low, high, goal, rounds):
     """Even out the quads; a vertex moves only when the worst quad round it is not spoilt.
 
@@ -263,50 +267,6 @@ def smooth_quads(m, g, quads, outward, offsets, around, near_offsets, near, low,
                 step *= 0.5
 
 
-@njit(cache=True, nogil=True)
-def update_outward(m, g, quads, regions, outward):
-    """Mean surface normals at the quads' centres and smooth corners; the centres are walked to from the corners."""
-    X = m.X
-    starts = np.empty(128, dtype=np.int64)
-    for q in range(len(quads)):
-        x, y, z, n = 0.0, 0.0, 0.0, np.int64(0)
-        for k in range(4):
-            p = quads[q, k]
-            n = starts_of(m, g, p, regions[q], starts, n)
-            x, y, z = x + 0.25 * X[p, 0], y + 0.25 * X[p, 1], z + 0.25 * X[p, 2]
-        _, _, _, at = put_on(x, y, z, outward[q, 0], outward[q, 1], outward[q, 2], starts, n, g)
-        if at < 0:
-            continue
-        # with the normals at smooth corners: the centre of a quad that bends round an edge may land on either skin
-        ox, oy, oz = g.normal[at, 0], g.normal[at, 1], g.normal[at, 2]
-        for k in range(4):
-            p = quads[q, k]
-            if m.kind[p] == 0:
-                ox, oy, oz = ox + m.N[p, 0], oy + m.N[p, 1], oz + m.N[p, 2]
-        size = np.sqrt(ox * ox + oy * oy + oz * oz)
-        if size > 0.0:
-            outward[q, 0], outward[q, 1], outward[q, 2] = ox / size, oy / size, oz / size
-
-
-@njit(cache=True, nogil=True)
-def smooth_paths(m, g, ends, regions, normals, share, points, triangles):
-    """Points (e, k, 3) at the shares of each smooth edge's chord, put on the surface one after the other."""
-    X = m.X
-    starts = np.empty(128, dtype=np.int64)
-    for e in range(len(ends)):
-        a, b = ends[e, 0], ends[e, 1]
-        n = starts_of(m, g, a, regions[e], starts, np.int64(0))
-        n = starts_of(m, g, b, regions[e], starts, n)
-        for i in range(len(share)):
-            r = share[i]
-            x = X[a, 0] + r * (X[b, 0] - X[a, 0])
-            y = X[a, 1] + r * (X[b, 1] - X[a, 1])
-            z = X[a, 2] + r * (X[b, 2] - X[a, 2])
-            sx, sy, sz, at = put_on(x, y, z, normals[e, 0], normals[e, 1], normals[e, 2], starts, n, g)
-            points[e, i, 0], points[e, i, 1], points[e, i, 2] = sx, sy, sz
-            triangles[e, i] = at
-
-
 @inner
 def curve_stretch(g, c, low, high, out, n):
     """Append the polyline of curve c from arc length low to high to `out`; an empty `out` only counts."""
@@ -328,12 +288,10 @@ def curve_stretch(g, c, low, high, out, n):
     return n + 1
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, no_cfunc_wrapper=True)
 def curve_paths(g, curves, low, high, offsets, out):
     """Stretches of curves one after the other; with an empty `out` only `offsets` is filled."""
-    empty = np.empty((0, 3))
     for e in range(len(curves)):
-        if len(out):
-            curve_stretch(g, curves[e], low[e], high[e], out, offsets[e])
-        else:
-            offsets[e + 1] = offsets[e] + curve_stretch(g, curves[e], low[e], high[e], empty, np.int64(0))
+        n = curve_stretch(g, curves[e], low[e], high[e], out, offsets[e])
+        if len(out) == 0:
+            offsets[e + 1] = n

@@ -4,6 +4,8 @@ A vertex is smooth (kind 0, anywhere in its region), on a feature curve (kind 1,
 anchor).
 """
 
+# mypy: disable-error-code="untyped-decorator,no-any-return,no-untyped-def,no-untyped-call"
+
 from __future__ import annotations
 
 from typing import Any, NamedTuple
@@ -239,7 +241,7 @@ def collapse_score(m, g, v, w, ring, ring_w, limit):
             p, q = T[t, (k + 1) % 3], T[t, (k + 2) % 3]
             if state == 1 and (p == w or q == w):
                 continue
-            value = quality(m, g, v if state == 0 else w, p, q, R[t], state == 1)
+            value = quality(m, g, v if state == 0 else w, p, q, R[t], state)
             if state == 0:
                 worst_old = min(worst_old, value)
             elif value <= 0.0 or value < min(_GOOD, worst_old):
@@ -279,7 +281,7 @@ def collapse(m, v, w, ring):
     v2t[v] = -1
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy", no_cfunc_wrapper=True)
 def collapse_pass(m, g, count, scale, limit):
     """Collapse edges shorter than `scale` times the wanted length; how many."""
     T, H, kind = m.T, m.H, m.kind
@@ -311,7 +313,7 @@ def collapse_pass(m, g, count, scale, limit):
     return done
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy", no_cfunc_wrapper=True)
 def flip_pass(m, g, count):
     """Turn smooth edges where that betters the worse of the two triangles; how many."""
     T, B, F, v2t = m.T, m.B, m.F, m.v2t
@@ -338,7 +340,7 @@ def flip_pass(m, g, count):
                     i, j, k3 = a, d, c
                 else:
                     i, j, k3 = d, b, c
-                value = quality(m, g, i, j, k3, region, True)
+                value = quality(m, g, i, j, k3, region, np.int64(1))
                 if piece < 2:
                     old = min(old, value)
                 else:
@@ -554,7 +556,7 @@ def split_edge(m, g, t, k, vertices, triangles, starts):
         for piece in range(3):
             i = (a if half == 0 else b) if piece != 2 else p
             j = (b if half == 0 else a) if piece != 1 else p
-            good = quality(m, g, i, j, c if half == 0 else d, R[tri], True) > 0.0
+            good = quality(m, g, i, j, c if half == 0 else d, R[tri], np.int64(1)) > 0.0
             if piece == 0:
                 sound = good
             elif sound and not good:
@@ -583,7 +585,7 @@ def split_edge(m, g, t, k, vertices, triangles, starts):
     return True
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy", no_cfunc_wrapper=True)
 def split_pass(m, g, vertices, triangles, limit):
     """Halve edges longer than `limit` times the wanted length, the longest first; (vertices, triangles) in use now.
 
@@ -611,7 +613,7 @@ def split_pass(m, g, vertices, triangles, limit):
     return vertices, triangles
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy", no_cfunc_wrapper=True)
 def smooth_pass(m, g, vertices, relax):
     """Move smooth vertices to the mean of their triangles' centres, curve vertices to even spacing; how many."""
     kind, T, R, X, H, vt, vs, N = m.kind, m.T, m.R, m.X, m.H, m.vt, m.vs, m.N
@@ -627,7 +629,7 @@ def smooth_pass(m, g, vertices, relax):
         old = 1.0
         for i in range(n):
             t = ring[i]
-            old = min(old, quality(m, g, T[t, 0], T[t, 1], T[t, 2], R[t], True))
+            old = min(old, quality(m, g, T[t, 0], T[t, 1], T[t, 2], R[t], np.int64(1)))
         ox, oy, oz, oh, ot, os = X[v, 0], X[v, 1], X[v, 2], H[v], vt[v], vs[v]
         onx, ony, onz = N[v, 0], N[v, 1], N[v, 2]
         if kind[v] == 1:
@@ -664,7 +666,7 @@ def smooth_pass(m, g, vertices, relax):
         new = 1.0
         for i in range(n):
             t = ring[i]
-            new = min(new, quality(m, g, T[t, 0], T[t, 1], T[t, 2], R[t], True))
+            new = min(new, quality(m, g, T[t, 0], T[t, 1], T[t, 2], R[t], np.int64(1)))
         if new < min(old, _GOOD):
             X[v, 0], X[v, 1], X[v, 2] = ox, oy, oz
             N[v, 0], N[v, 1], N[v, 2] = onx, ony, onz

@@ -1,12 +1,14 @@
 """Kernel of `sizing`: a field whose growth is bounded."""
 
+# mypy: disable-error-code="untyped-decorator,no-any-return,no-untyped-def,no-untyped-call"
+
 from __future__ import annotations
 
 import numpy as np
 from numba import njit
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, no_cfunc_wrapper=True)
 def grade(points, triangles, slope, size):
     """Lower `size` (n,) until it differs by at most `slope` times the length along every edge."""
     m = len(triangles)

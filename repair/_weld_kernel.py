@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
+
 from patchwright.models.arrays import Array, IntArray
 
 CANDIDATES = 6  # nearest free edges kept per free edge
@@ -87,9 +88,7 @@ def edge_candidates(
     keys, items = np.empty(2 * n, dtype=np.int64), np.empty(2 * n, dtype=np.int64)
     offsets = np.zeros(_slots(n) + 2, dtype=np.int64)
     _sort_cells(levels.reshape(-1), cells.reshape(-1, 3).astype(np.int64), keys, offsets, items)
-    _edge_candidates(
-        a, b, apex, tag, reach, level, corner.astype(np.int64), keys, offsets, items, partner, gap, kind
-    )
+    _edge_candidates(a, b, apex, tag, reach, level, corner.astype(np.int64), keys, offsets, items, partner, gap, kind)
     return partner, gap, kind
 
 
@@ -327,7 +326,7 @@ def _match_edges(
             swap = c
             c = d
             d = swap
-        if a == b or a == d or c == b or c == d:
+        if a == b or a == d or c == b or c == d:  # noqa: SIM109  (a tuple costs compile time)
             continue
         if a != c and not _may_join(a, c, limit, parent, follow, points, triangles, offsets, around):
             continue

@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+
 from patchwright.models.arrays import BoolArray, IntArray
 from patchwright.models.triangulation import Triangulation
 from patchwright.repair.weld import free_edges

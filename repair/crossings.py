@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+
 from patchwright.models.arrays import IntArray
 from patchwright.models.tree import Tree
 from patchwright.models.triangulation import Triangulation

@@ -66,9 +66,10 @@ def trace_paths(quad_mesh: QuadMesh, features: Features) -> LayoutEdges:
     triangle = np.empty((len(smooth), len(share)), dtype=np.int64)
     one, two = edge_quads[smooth].T
     normals = quad_mesh.outward[one] + np.where((two >= 0)[:, None], quad_mesh.outward[two], 0.0)
-    kernel.smooth_paths(
-        mesh, ground, np.ascontiguousarray(edges[smooth]), quad_mesh.region[one], normals, share, inner, triangle
-    )
+    begin, finish = mesh.X[edges[smooth, 0]], mesh.X[edges[smooth, 1]]
+    chord = begin[:, None] + share[None, :, None] * (finish - begin)[:, None]
+    parents = np.ascontiguousarray(edges[smooth])
+    kernel.land(mesh, ground, parents, quad_mesh.region[one], chord, normals, inner, triangle)
     # all paths in one array
     count = np.full(e, PATH_POINTS, dtype=np.int64)
     count[which] = np.diff(arc_offsets)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+
 from patchwright.models.adjacency import Adjacency
 from patchwright.models.arrays import BoolArray
 from patchwright.models.tolerance import Tolerance

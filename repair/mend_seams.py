@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+
 from patchwright.models.adjacency import Adjacency
 from patchwright.models.arrays import Array
 from patchwright.models.triangulation import Triangulation

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+
 from patchwright.models.adjacency import Adjacency
 from patchwright.models.arrays import Array, BoolArray, IntArray
 from patchwright.models.triangulation import Triangulation

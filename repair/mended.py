@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
+
 from patchwright.models.arrays import Array, BoolArray, IntArray
 from patchwright.models.tolerance import Tolerance
 from patchwright.models.triangulation import Triangulation

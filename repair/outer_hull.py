@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+
 from patchwright.models.arrays import Array, BoolArray, IntArray
 from patchwright.models.triangulation import Triangulation
 from patchwright.repair.untangle import winding

@@ -124,16 +124,15 @@ def pair(coarse: CoarseMesh) -> QuadMesh:
         np.zeros(n + e + f, dtype=np.int64),
     ]
     grown = records.Mesh._make(columns)
-    kernel.place_new(
-        grown,
-        ground,
-        n,
-        parents,
-        regions,
-        np.concatenate([curve, np.full(f, -1)]),
-        np.concatenate([arcs[st, sk], np.zeros((f, 2))]),
-        np.concatenate([edge_normal, face_normal]),
-    )
+    spot = np.zeros((e + f, 1, 3))
+    for k4 in range(4):
+        spot[:, 0] += np.where((parents[:, k4] >= 0)[:, None], grown.X[parents[:, k4]], 0.0)
+    spot /= (parents >= 0).sum(axis=1)[:, None, None]
+    new_curve = np.concatenate([curve, np.full(f, -1)])
+    landed, at = np.empty_like(spot), np.empty((e + f, 1), dtype=np.int64)
+    kernel.land(grown, ground, parents, regions, spot, np.concatenate([edge_normal, face_normal]), landed, at)
+    at = np.where(at[:, 0] >= 0, at[:, 0], mesh.vt[parents[:, 0]])
+    kernel.place_new(grown, ground, n, new_curve, np.concatenate([arcs[st, sk], np.zeros((f, 2))]), landed[:, 0], at)
     quads, owner = _split_faces(faces, kept, n, e)
     # feature edges, each in two halves, in the curve's direction
     on = np.flatnonzero(curve >= 0)

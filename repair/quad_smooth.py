@@ -37,11 +37,30 @@ def smooth(quad_mesh: QuadMesh, *, rounds: int = ROUNDS) -> None:
     for turn in range(rounds + EXTRA if rounds else 0):
         if turn >= rounds and scaled_jacobians(quad_mesh).min() > POOR:
             break
-        kernel.update_outward(mesh, ground, quads, quad_mesh.region, quad_mesh.outward)
+        update_outward(mesh, ground, quads, quad_mesh.region, quad_mesh.outward)
         kernel.smooth_quads(
             mesh, ground, quads, quad_mesh.outward, offsets, around, near_offsets, near, low, high, GOAL, PASSES
         )
-    kernel.update_outward(mesh, ground, quads, quad_mesh.region, quad_mesh.outward)
+    update_outward(mesh, ground, quads, quad_mesh.region, quad_mesh.outward)
+
+
+def update_outward(mesh: Any, ground: Any, quads: IntArray, region: IntArray, outward: Array) -> None:
+    """Mean surface normals at the quads' centres and smooth corners, in place; the centres are walked to."""
+    from patchwright.repair import _quad_kernel as kernel
+
+    centre = np.zeros((len(quads), 1, 3))
+    for k in range(4):
+        centre[:, 0] += 0.25 * mesh.X[quads[:, k]]
+    triangle = np.empty((len(quads), 1), dtype=np.int64)
+    kernel.land(mesh, ground, quads, region, centre, outward, np.empty_like(centre), triangle)
+    # with the normals at smooth corners: the centre of a quad that bends round an edge may land on either skin
+    total = ground.normal[triangle[:, 0]]
+    for k in range(4):
+        corner = quads[:, k]
+        total += np.where((mesh.kind[corner] == 0)[:, None], mesh.N[corner], 0.0)
+    size = np.sqrt(total[:, 0] ** 2 + total[:, 1] ** 2 + total[:, 2] ** 2)
+    found = (triangle[:, 0] >= 0) & (size > 0.0)
+    outward[found] = total[found] / size[found, None]
 
 
 def scaled_jacobians(quad_mesh: QuadMesh) -> Array:

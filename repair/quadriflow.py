@@ -104,8 +104,8 @@ def _check(vertices: Array, quads: IntArray, features: Features) -> None:
 def _place(vertices: Array, quads: IntArray, features: Features) -> tuple[QuadMesh, Features]:
     """The quads on the triangulation, all vertices free."""
     from patchwright.models.tree import Tree
-    from patchwright.repair import _quad_kernel as kernel
     from patchwright.repair import _remesh_kernel as records
+    from patchwright.repair.quad_smooth import update_outward
     from patchwright.repair.remesh import ground_of
 
     used, quads = np.unique(quads, return_inverse=True)
@@ -147,5 +147,5 @@ def _place(vertices: Array, quads: IntArray, features: Features) -> tuple[QuadMe
     p = mesh.X[quads]
     outward = np.cross(p[:, 2] - p[:, 0], p[:, 3] - p[:, 1])
     region = np.zeros(m, dtype=np.int64)
-    kernel.update_outward(mesh, ground, quads, region, outward)
+    update_outward(mesh, ground, quads, region, outward)
     return QuadMesh(ground, mesh, quads, region, outward, np.zeros((0, 2), dtype=np.int64), none), bare

@@ -13,10 +13,12 @@ from typing import Any
 import numpy as np
 
 from patchwright.models.arrays import Array, IntArray
+from patchwright.models.errors import GeometryError
 from patchwright.repair.features import Features
 
 LONG, SHORT = 4.0 / 3.0, 4.0 / 5.0  # of the wanted length: split above, collapse below
 LONGEST = 1.6  # of the wanted length: no collapse makes a longer edge
+MOST_TRIANGLES = 200_000  # a coarse mesh has thousands: beyond this, splitting runs away
 ROUNDS = 6
 
 
@@ -177,6 +179,8 @@ def _split(mesh: Any, ground: Any) -> Any:
 
     while True:
         n, m = len(mesh.X), len(mesh.T)
+        if m > MOST_TRIANGLES:
+            raise GeometryError(f"the remeshing does not settle: {m} triangles and edges still longer than wanted")
         mesh = _compact(mesh, room=2 * m + 64)
         used_v, used_t = kernel.split_pass(mesh, ground, n, m, LONG)
         full = used_v + 1 > len(mesh.X) or used_t + 2 > len(mesh.T)

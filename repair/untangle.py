@@ -8,6 +8,7 @@ closed there by a cap, which the union then drops.
 from __future__ import annotations
 
 import numpy as np
+
 from patchwright.models.adjacency import Adjacency
 from patchwright.models.arrays import Array, BoolArray, IntArray
 from patchwright.models.triangulation import Triangulation

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
+
 from patchwright.models.arrays import Array, IntArray
 from patchwright.models.errors import ParameterError
 from patchwright.models.tolerance import Tolerance

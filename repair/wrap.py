@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from itertools import permutations
 
 import numpy as np
+
 from patchwright.models.adjacency import Adjacency
 from patchwright.models.arrays import Array, IntArray
 from patchwright.models.errors import ParameterError

@@ -1,4 +1,5 @@
 """Rows of numbers and of polygons, one a line, read in compiled loops."""
+# mypy: disable-error-code="untyped-decorator,no-any-return,no-untyped-def,no-untyped-call"
 
 from __future__ import annotations
 

@@ -5,6 +5,7 @@ Up to 19 digits w·10^q: exact arithmetic where w and 10^|q| are float64 numbers
 case exists for up to 19 digits is proved by Mushtak & Lemire, "Fast number parsing without fallback", ibid. 53 (2023).
 More digits: accepted when w and w + 1 round to the same number, else left to the caller (`SLOW`).
 """
+# mypy: disable-error-code="untyped-decorator,no-any-return,no-untyped-def,no-untyped-call"
 
 from __future__ import annotations
 
@@ -61,8 +62,8 @@ def nearest(w: np.uint64, q: int) -> float:
         return np.inf
     if w <= np.uint64(9007199254740992) and -22 <= q <= 22:
         if q < 0:
-            return np.float64(w) / POWERS_OF_TEN[-q]  # type: ignore[no-any-return]
-        return np.float64(w) * POWERS_OF_TEN[q]  # type: ignore[no-any-return]
+            return np.float64(w) / POWERS_OF_TEN[-q]
+        return np.float64(w) * POWERS_OF_TEN[q]
     zeros = 0
     step = 32
     while step > 0:
