@@ -31,7 +31,7 @@ from patchwright.repair.resurface import resurface
 
 COVERAGE_GOAL = 0.99  # share of the area, both ways, within the fit tolerance; below it a result has not converged
 COVERAGE_LEAST = 0.95  # below it a result is refused
-RETRIES = 2
+RETRIES = 1
 FINER = 2.0  # quads of each retry against the one before
 WIDEST = 10.0  # times: how far a fit tolerance nobody asked for may widen to the height of coarse facets
 CHORD = 0.25  # of the fit tolerance: how far a tessellation of the patches may stray from them

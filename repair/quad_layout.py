@@ -14,7 +14,7 @@ import numpy as np
 
 from patchwright.models.arrays import Array, BoolArray, IntArray
 from patchwright.models.arrays import frozen as own_copy
-from patchwright.models.errors import GeometryError, ParameterError
+from patchwright.models.errors import ParameterError
 from patchwright.models.triangulation import Triangulation
 
 if TYPE_CHECKING:
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from patchwright.repair.pairing import QuadMesh
 
 METHODS = ("pairs", "quadriflow")
-OTHER_TARGETS = (1.25, 0.8, 1.6)  # shares of the quads tried where some are folded; the fewest folds win
 RETRIES = 3
 NEAR_TARGET = 1.15  # number of quads against the wanted one
 
@@ -146,17 +145,7 @@ def quad_layout(
         quad_mesh, features = quadriflow(features, target)
     else:
         quad_mesh = _pairs(features, target)
-    layout = _finish(quad_mesh, features, begin)
-    for share in OTHER_TARGETS:
-        if method == "quadriflow" or layout.report is None or layout.report.folded == 0:
-            break
-        try:
-            other = _finish(_pairs(features, max(1, round(share * len(layout)))), features, begin)
-        except GeometryError:
-            continue  # this size does not settle; the layout at hand stands
-        if other.report is not None and other.report.folded < layout.report.folded:
-            layout = other
-    return layout
+    return _finish(quad_mesh, features, begin)
 
 
 def _pairs(features: Features, target: int | None) -> QuadMesh:
