@@ -139,7 +139,7 @@ def _fit(
         )
         if best is None or deviation.coverage > best[1].coverage:
             best = network, deviation
-        if deviation.coverage >= COVERAGE_GOAL or not isinstance(layout, str):
+        if deviation.coverage >= COVERAGE_LEAST or not isinstance(layout, str):
             break
         wanted = int(FINER * len(quads.quads))
     assert best is not None
