@@ -18,6 +18,8 @@ from patchwright.repair._surface_walk_kernel import inner, walk
 _RING = 512  # most triangles round a vertex; a vertex with more is left alone
 _FACING = 0.34  # cosine of 70 degrees: how far a triangle may turn from the surface's normal at its corners
 _GOOD = 0.25  # quality (1 is equilateral) that is never asked to be bettered
+_LENGTHENED = 1.05  # how much a collapse may lengthen an edge that is too long already
+_REFUSED = -9.0  # score of a collapse that is not allowed; below any quality
 
 
 class Ground(NamedTuple):
@@ -106,7 +108,11 @@ def facing(m, g, v, region, nx, ny, nz):
 
 @inner
 def quality(m, g, a, b, c, region, strict):
-    """4 sqrt(3) area / sum of squared sides, 1 when equilateral; -1 when `strict` and turned against the surface."""
+    """4 sqrt(3) area / sum of squared sides, 1 when equilateral.
+
+    When `strict`, a triangle turned against the surface gets its least cosine to the normals at its corners less 1, so
+    that of two turned ones the better is seen.
+    """
     X, N, kind = m.X, m.N, m.kind
     ux, uy, uz = X[b, 0] - X[a, 0], X[b, 1] - X[a, 1], X[b, 2] - X[a, 2]
     wx, wy, wz = X[c, 0] - X[a, 0], X[c, 1] - X[a, 1], X[c, 2] - X[a, 2]
@@ -118,13 +124,15 @@ def quality(m, g, a, b, c, region, strict):
         return -1.0 if strict else 0.0
     if strict:
         nx, ny, nz = nx / size, ny / size, nz / size
+        least = 1.0
         for i in range(3):
             p = a if i == 0 else (b if i == 1 else c)
             if kind[p] == 0:
-                if N[p, 0] * nx + N[p, 1] * ny + N[p, 2] * nz < _FACING:
-                    return -1.0
-            elif facing(m, g, p, region, nx, ny, nz) < _FACING:
-                return -1.0
+                least = min(least, N[p, 0] * nx + N[p, 1] * ny + N[p, 2] * nz)
+            else:
+                least = min(least, facing(m, g, p, region, nx, ny, nz))
+        if least < _FACING:
+            return least - 1.0
     return 2.0 * np.sqrt(3.0) * size / squares
 
 
@@ -180,13 +188,13 @@ def replace_neighbour(m, t, old, new, curve):
 
 @inner
 def collapse_score(m, g, v, w, ring, ring_w, limit):
-    """Worst quality after moving v onto w, or -1 when that is not allowed."""
+    """Worst quality after moving v onto w, or `_REFUSED` when that is not allowed."""
     kind, T, F, B, mark, R, H = m.kind, m.T, m.F, m.B, m.mark, m.R, m.H
     if kind[v] == 2:
-        return -1.0
+        return _REFUSED
     n = ring_of(m, v, ring)
     if n == 0:
-        return -1.0
+        return _REFUSED
     shared = 0
     along_curve = False
     for i in range(n):
@@ -200,15 +208,15 @@ def collapse_score(m, g, v, w, ring, ring_w, limit):
             if F[t, to_w] >= 0:
                 along_curve = True
             if F[t, (k + 1) % 3] >= 0 and F[t, to_x] >= 0:
-                return -1.0
+                return _REFUSED
             if B[t, (k + 1) % 3] < 0 and B[t, to_x] < 0:
-                return -1.0
+                return _REFUSED
     if kind[v] == 1 and not along_curve:
-        return -1.0
+        return _REFUSED
     # link condition
     nw = ring_of(m, w, ring_w)
     if nw == 0:
-        return -1.0
+        return _REFUSED
     for i in range(n):
         for k in range(3):
             mark[T[ring[i], k]] = 0
@@ -224,30 +232,37 @@ def collapse_score(m, g, v, w, ring, ring_w, limit):
                 common += 1
                 mark[x] = 0
     if common != shared:
-        return -1.0
+        return _REFUSED
     if limit > 0.0:
         for i in range(n):
             for k in range(3):
                 x = T[ring[i], k]
                 if x != v and x != w:
                     d = distance(m, w, x)
-                    if d > limit * 0.5 * (H[w] + H[x]) and d > distance(m, v, x):
-                        return -1.0
-    worst_old, worst_new = 1.0, 1.0
-    for state in range(2):
+                    if d > limit * 0.5 * (H[w] + H[x]) and d > _LENGTHENED * distance(m, v, x):
+                        return _REFUSED
+    worst_old, worst_new, turned = 1.0, 1.0, 1.0
+    for state in range(3):
+        if state == 2 and worst_new > 0.0:
+            break
         for i in range(n):
             t = ring[i]
             k = corner_of(m, t, v)
             p, q = T[t, (k + 1) % 3], T[t, (k + 2) % 3]
             if state == 1 and (p == w or q == w):
                 continue
-            value = quality(m, g, v if state == 0 else w, p, q, R[t], state)
+            value = quality(m, g, w if state == 1 else v, p, q, R[t], state)
             if state == 0:
                 worst_old = min(worst_old, value)
-            elif value <= 0.0 or value < min(_GOOD, worst_old):
-                return -1.0
-            else:
+            elif state == 1:
+                if value == 0.0 or value > 0.0 and value < min(_GOOD, worst_old):
+                    return _REFUSED
                 worst_new = min(worst_new, value)
+            else:
+                turned = min(turned, value)
+    # turned triangles may stay where the collapse turns them less
+    if worst_new <= 0.0 and worst_new <= turned:
+        return _REFUSED
     return worst_new
 
 
@@ -299,7 +314,7 @@ def collapse_pass(m, g, count, scale, limit):
                 continue
             if m.F[t, k] < 0 and kind[a] > 0 and kind[b] > 0:
                 continue
-            best, gone, stays = -1.0, np.int64(-1), np.int64(-1)
+            best, gone, stays = _REFUSED, np.int64(-1), np.int64(-1)
             for way in range(2):
                 p, q = (a, b) if way == 0 else (b, a)
                 if kind[p] <= kind[q]:

@@ -20,6 +20,7 @@ CORNER_TURN = 40.0  # degrees a feature line turns at a corner
 SPECK_EDGES = 5  # a line of fewer edges and shorter than SPECK_SHARE is noise unless both its ends are attached
 SPECK_SHARE = 0.01  # of the diagonal
 SLIT = 1e-3  # of the diagonal: two lines between the same ends, nearer to each other, are one
+TEETH_ROUNDS = 4
 NOISY_HEIGHT = 20.0  # times the noise: a lower triangle's own normal is off by degrees
 NEEDLE_HEIGHT = 6.0  # times the noise: a lower triangle has no normal of its own
 FOLLOWED, SHARP, BOUNDARY = 1, 2, 3  # kinds of curves: only followed, sharp, boundary
@@ -64,6 +65,12 @@ class Features:
         """(c,) arc length of each curve."""
         return np.asarray(self.along[self.offsets[1:] - 1])
 
+    def curve_edges(self, kind: int) -> IntArray:
+        """(k, 2) vertex pairs along the curves of one kind."""
+        owner = np.repeat(np.arange(len(self.kind)), np.diff(self.offsets))
+        here = np.flatnonzero((owner[:-1] == owner[1:]) & (self.kind[owner[:-1]] == kind))
+        return np.stack([self.vertices[here], self.vertices[here + 1]], axis=1)
+
 
 def find_features(triangulation: Triangulation, *, angle: float = 30.0, frozen: IntArray | None = None) -> Features:
     """The feature curves of an oriented 2-manifold.
@@ -105,11 +112,11 @@ def find_features(triangulation: Triangulation, *, angle: float = 30.0, frozen: 
     offsets, incident = _incident(edges, len(points))
     kernel.grow_ends(points, edges, offsets, incident, grown, weak & ~free)
     sharp |= grown & ~firm
+    width = max(NOISY_HEIGHT * noise, SLIT * body.diagonal)
     for _ in range(2):
-        sharp &= _not_slits(
-            edges, sharp | firm, firm, length, cosine, points, max(NOISY_HEIGHT * noise, SLIT * body.diagonal)
-        )
+        sharp &= _not_slits(edges, sharp | firm, firm, length, cosine, points, width)
         sharp &= _not_specks(edges, sharp | firm, firm, length, body.diagonal)
+    _cut_teeth(body, neighbours, normals, edges, sides, sharp, firm, length, width)
     kind = np.where(free, BOUNDARY, np.where(sharp, SHARP, np.where(follow, FOLLOWED, 0)))
     return _chains(body, neighbours, normals, noise, edges, sides, kind, first, second)
 
@@ -141,7 +148,13 @@ def _chains(
     starts, vertices, _, _ = kernel.trace(ends, offsets, incident, stop)
     turn = np.ones(len(vertices))
     kernel.turning(points, starts, vertices, NOISY_HEIGHT * noise, turn)
-    stop[vertices[turn < np.cos(np.radians(CORNER_TURN))]] = True
+    # no corner in the last bit before a loose end: a curve of its own from there would be shorter than any quad
+    owner, along = _arc_lengths(points, starts, vertices)
+    rows = starts + np.arange(len(starts))
+    to_begin = np.where(degree[vertices[rows[:-1]]] == 1, 0.0, np.inf)[owner] + along
+    to_end = np.where(degree[vertices[rows[1:] - 1]] == 1, along[rows[1:] - 1], np.inf)[owner] - along
+    attached = np.minimum(to_begin, to_end) > 0.5 * SPECK_SHARE * body.diagonal
+    stop[vertices[(turn < np.cos(np.radians(CORNER_TURN))) & attached]] = True
     lo, hi = starts[:-1] + np.arange(len(starts) - 1), starts[1:] + np.arange(len(starts) - 1)
     for c in np.flatnonzero(vertices[lo] == vertices[hi]) if len(lo) else ():
         ring = vertices[lo[c] : hi[c]]
@@ -150,11 +163,7 @@ def _chains(
     starts, vertices, walked, chain = kernel.trace(ends, offsets, incident, stop)
     count = len(starts) - 1
     rows = starts + np.arange(count + 1)
-    owner = np.repeat(np.arange(count), np.diff(rows))
-    step = np.zeros(len(vertices))
-    step[1:] = np.linalg.norm(np.diff(points[vertices], axis=0), axis=1)
-    total = np.cumsum(step)
-    along = total - total[rows[:-1]][owner]
+    owner, along = _arc_lengths(points, starts, vertices)
     segment = np.minimum(np.arange(len(vertices)) - owner, starts[1:][owner] - 1)
     edge = picked[walked[segment]]
     left = np.full(len(edges), -1, dtype=np.int64)
@@ -180,6 +189,16 @@ def _chains(
         np.flatnonzero(stop),
         noise,
     )
+
+
+def _arc_lengths(points: Array, starts: IntArray, vertices: IntArray) -> tuple[IntArray, Array]:
+    """The chain of every row of `vertices` and its arc length from the chain's start."""
+    rows = starts + np.arange(len(starts))
+    owner = np.repeat(np.arange(len(starts) - 1), np.diff(rows))
+    step = np.zeros(len(vertices))
+    step[1:] = np.linalg.norm(np.diff(points[vertices], axis=0), axis=1)
+    total = np.cumsum(step)
+    return owner, total - total[rows[:-1]][owner] if len(vertices) else total
 
 
 def _split_touching(triangulation: Triangulation, frozen: IntArray | None) -> tuple[Triangulation, IntArray]:
@@ -315,6 +334,50 @@ def _not_specks(edges: IntArray, feature: BoolArray, firm: BoolArray, length: Ar
             break
         keep[drop] = False
     return keep
+
+
+def _cut_teeth(
+    body: Triangulation,
+    neighbours: IntArray,
+    normals: Array,
+    edges: IntArray,
+    sides: IntArray,
+    sharp: BoolArray,
+    firm: BoolArray,
+    length: Array,
+    width: float,
+) -> None:
+    """Where a sharp line runs out along one side of a triangle and back along the next, take the third side instead.
+
+    `sharp` and `normals` are changed in place. Only teeth narrower than `width` whose line turns back by less than
+    `CORNER_TURN` are cut, and the triangle takes the normal of the surface it joins.
+    """
+    for _ in range(TEETH_ROUNDS):
+        feature = sharp | firm
+        degree = np.bincount(edges[feature].reshape(-1), minlength=len(body.vertices))
+        # side k is the one not sharp, k + 1 and k + 2 meet at corner k + 2
+        third = ~feature[sides] & (sharp & ~firm)[np.roll(sides, -1, axis=1)] & (sharp & ~firm)[np.roll(sides, -2, axis=1)]
+        t, k = np.nonzero(third & (length[sides] < width))
+        apex = body.triangles[t, (k + 2) % 3]
+        one = body.vertices[body.triangles[t, k]] - body.vertices[apex]
+        two = body.vertices[body.triangles[t, (k + 1) % 3]] - body.vertices[apex]
+        cosine = np.einsum("ij,ij->i", one, two)
+        arms = np.linalg.norm(one, axis=1) * np.linalg.norm(two, axis=1)
+        tooth = (degree[apex] == 2) & (cosine > np.cos(np.radians(CORNER_TURN)) * arms)
+        t, k = t[tooth], k[tooth]
+        # no two that share a side in one round
+        first = np.full(len(edges), len(t))
+        np.minimum.at(first, sides[t].reshape(-1), np.repeat(np.arange(len(t)), 3))
+        alone = (first[sides[t]] == np.arange(len(t))[:, None]).all(axis=1)
+        t, k = t[alone], k[alone]
+        if not len(t):
+            break
+        sharp[sides[t, k]] = True
+        for step in (1, 2):
+            sharp[sides[t, (k + step) % 3]] = False
+        joined = neighbours[t[:, None], (k[:, None] + np.array([1, 2])) % 3]
+        largest = body.areas[joined].argmax(axis=1)
+        normals[t] = normals[joined[np.arange(len(t)), largest]]
 
 
 def _not_slits(

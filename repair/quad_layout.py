@@ -20,6 +20,7 @@ from patchwright.models.triangulation import Triangulation
 if TYPE_CHECKING:
     from patchwright.repair.features import Features
     from patchwright.repair.pairing import QuadMesh
+    from patchwright.repair.ridges import Ridges
 
 METHODS = ("pairs", "quadriflow")
 RETRIES = 3
@@ -144,11 +145,25 @@ def quad_layout(
 
         quad_mesh, features = quadriflow(features, target)
     else:
-        quad_mesh = _pairs(features, target)
+        features, ridges = _with_ridges(features, angle)
+        quad_mesh = _pairs(features, ridges, target)
     return _finish(quad_mesh, features, begin)
 
 
-def _pairs(features: Features, target: int | None) -> QuadMesh:
+def _with_ridges(features: Features, angle: float) -> tuple[Features, Ridges | None]:
+    """The features with the ridge lines among the curves to follow, and those ridges; None where there are none."""
+    from patchwright.repair.features import FOLLOWED, find_features
+    from patchwright.repair.ridges import find_ridges
+    from patchwright.repair.sizing import surface_curvature, widest_ridge
+
+    ridges = find_ridges(features, surface_curvature(features), widest_ridge(features))
+    if not len(ridges.edges):
+        return features, None
+    follow = np.concatenate([features.curve_edges(FOLLOWED), ridges.edges])
+    return find_features(features.body, angle=angle, frozen=follow), ridges
+
+
+def _pairs(features: Features, ridges: Ridges | None, target: int | None) -> QuadMesh:
     """Coarse triangles paired and split; once more with corrected sizes where the number of quads is off."""
     from patchwright.repair.pairing import pair
     from patchwright.repair.quad_smooth import smooth
@@ -157,7 +172,7 @@ def _pairs(features: Features, target: int | None) -> QuadMesh:
 
     factor, best, error = 1.0, None, np.inf
     for _ in range(RETRIES):
-        size, wanted = size_field(features, target=target, factor=factor)
+        size, wanted = size_field(features, ridges, target=target, factor=factor)
         quad_mesh = pair(remesh(features, 2.0 * size))
         ratio = len(quad_mesh.quads) / wanted
         if abs(np.log(ratio)) < error:

@@ -10,20 +10,25 @@ import numpy as np
 
 from patchwright.models.arrays import Array, IntArray
 from patchwright.repair.features import Features
+from patchwright.repair.ridges import Ridges, flanks
 
 ANGLE_PER_QUAD = 30.0  # degrees of turn one bicubic piece takes
 LARGEST, SMALLEST = 0.15, 0.004  # of the diagonal: quads
+RIDGE_SIZE = 12.0  # radii of the bend: quads that begin at a ridge; sixteen pieces then follow the bend within r / 1000
 GRADING = 0.45  # growth of the size per length
 STRIP_ASPECT = 3.0  # longest quad in a strip between features against the strip's width
 MOST_QUADS = 1500  # where no number is asked for
 AREA_PER_QUAD = 0.85  # mean area of a quad against its size squared, measured on graded layouts
 
 
-def size_field(features: Features, *, target: int | None = None, factor: float = 1.0) -> tuple[Array, float]:
+def size_field(
+    features: Features, ridges: Ridges | None = None, *, target: int | None = None, factor: float = 1.0
+) -> tuple[Array, float]:
     """Wanted edge length of quads at every vertex of `features.body`, and the number of quads it stands for.
 
     Parameters
     ----------
+    ridges : ridge lines of the same triangulation, followed by `features`; None for none
     target : wanted number of quads, None for what the shape asks for (at most MOST_QUADS)
     factor : further scale of the sizes, to correct the number that came out
     """
@@ -32,6 +37,9 @@ def size_field(features: Features, *, target: int | None = None, factor: float =
     quad_angle = np.radians(ANGLE_PER_QUAD)
     curvature = surface_curvature(features)
     size = np.full(len(body.vertices), LARGEST * diagonal)
+    if ridges is not None:
+        curvature[flanks(features, ridges, curvature, RIDGE_SIZE)] = 0.0
+        size = np.minimum(size, RIDGE_SIZE * ridges.radius)
     np.minimum(size, np.divide(quad_angle, curvature, out=np.full_like(size, np.inf), where=curvature > 0), out=size)
     on_curve, limit = _curve_sizes(features, quad_angle)
     np.minimum.at(size, on_curve, limit)
@@ -49,6 +57,11 @@ def size_field(features: Features, *, target: int | None = None, factor: float =
             if abs(number / target - 1.0) < 0.02:
                 break
     return graded * factor, number
+
+
+def widest_ridge(features: Features) -> float:
+    """Radius below which a bend asks for quads smaller than the smallest there are."""
+    return SMALLEST * features.body.diagonal / float(np.radians(ANGLE_PER_QUAD))
 
 
 def surface_curvature(features: Features) -> Array:

@@ -29,7 +29,7 @@ CUBE_FACES = np.array(
 )
 
 
-def patchwright(*words, cwd=None, limit=120):
+def patchwright(*words, cwd=None, limit=600):
     return subprocess.run(
         [sys.executable, "-m", "patchwright.pipelines.cli", *map(str, words)],
         capture_output=True, text=True, timeout=limit, cwd=cwd, check=False,
