@@ -8,26 +8,22 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from patchwright.models.analytic.arc import arc_net
 from patchwright.models.analytic.frame import (
     TURN,
     Range,
     across,
-    bounded,
-    cosine,
     interval,
-    parameters,
+    line,
     point,
-    sine,
     unit,
 )
+from patchwright.models.analytic.revolution import ProfileNet, Revolution
 from patchwright.models.arrays import Array
 from patchwright.models.errors import ParameterError
-from patchwright.models.nurbs_surface import NurbsSurface
 
 
 @dataclass(frozen=True, slots=True, eq=False, init=False)
-class Cone:
+class Cone(Revolution):
     """S(u, v) = origin + r(v) (x cos u + y sin u) + v z with r(v) = ref_radius + v tan(half_angle); both nappes belong.
 
     Where r(v) is negative the point lies on the second nappe, half a turn round.
@@ -79,14 +75,9 @@ class Cone:
         put(self, "v", interval(v, (-math.inf, math.inf), "v"))
 
     @property
-    def ydir(self) -> Array:
-        """(3,) where u is a quarter turn."""
-        return np.cross(self.axis, self.xdir)
-
-    @property
-    def domain(self) -> tuple[Range, Range]:
-        """((u0, u1), (v0, v1)); infinite where unbounded."""
-        return self.u, self.v
+    def middle(self) -> Array:
+        """(3,) the origin."""
+        return self.origin
 
     @property
     def apex(self) -> Array:
@@ -97,29 +88,11 @@ class Cone:
         """The signed radius at distances v along the axis."""
         return np.asarray(self.ref_radius + math.tan(self.half_angle) * np.asarray(v, dtype=np.float64))
 
-    def __call__(self, u: npt.ArrayLike, v: npt.ArrayLike, nu: tuple[int, int] = (0, 0)) -> Array:
-        """(..., 3) the mixed derivative of order `nu` at broadcast parameters."""
-        us, vs = parameters(self.domain, u, v, nu)
-        a, b = nu
-        out = np.zeros((*us.shape, 3))
-        if b <= 1:
-            r = self.radius(vs)[..., None] if b == 0 else math.tan(self.half_angle)
-            out += r * (cosine(us, a) * self.xdir + sine(us, a) * self.ydir)
-        if a == 0 and b <= 1:
-            out += self.origin + vs[..., None] * self.axis if b == 0 else self.axis
-        return out
+    def profile(self, v: Array, order: int) -> tuple[Array, Array]:
+        """(..., 1) the derivatives of the given order of radius and height."""
+        along = line(v, order)
+        return self.radius(along) if order == 0 else math.tan(self.half_angle) * along, along
 
-    def to_nurbs(self) -> NurbsSurface:
-        """The bounded piece: rational quadratic in u, linear in v; the parameters agree at the knots.
-
-        Raises
-        ------
-        ParameterError : the piece is unbounded.
-        """
-        bounded(self.domain, "cone")
-        knots, net = arc_net(self.u)
-        w = np.repeat(net[:, 2:], 2, axis=1)
-        ring = (net[:, :1] * self.xdir + net[:, 1:2] * self.ydir) / net[:, 2:]
-        line = self.origin + np.array(self.v)[:, None] * self.axis
-        points = line + self.radius(self.v)[:, None] * ring[:, None]
-        return NurbsSurface((2, 1), (knots, np.repeat(self.v, 2)), points, w)
+    def profile_net(self) -> ProfileNet:
+        """The bounded profile: a line that slopes."""
+        return ProfileNet(1, np.repeat(self.v, 2), self.radius(self.v), np.array(self.v), np.ones(2))

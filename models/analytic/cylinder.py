@@ -8,26 +8,22 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from patchwright.models.analytic.arc import arc_net
 from patchwright.models.analytic.frame import (
     TURN,
     Range,
     across,
-    bounded,
-    cosine,
     interval,
-    parameters,
+    line,
     point,
     positive,
-    sine,
     unit,
 )
+from patchwright.models.analytic.revolution import ProfileNet, Revolution
 from patchwright.models.arrays import Array
-from patchwright.models.nurbs_surface import NurbsSurface
 
 
 @dataclass(frozen=True, slots=True, eq=False, init=False)
-class Cylinder:
+class Cylinder(Revolution):
     """S(u, v) = origin + radius (x cos u + y sin u) + v z; the normal S_u x S_v points outwards.
 
     Parameters
@@ -69,36 +65,14 @@ class Cylinder:
         put(self, "v", interval(v, (-math.inf, math.inf), "v"))
 
     @property
-    def ydir(self) -> Array:
-        """(3,) where u is a quarter turn."""
-        return np.cross(self.axis, self.xdir)
+    def middle(self) -> Array:
+        """(3,) the origin."""
+        return self.origin
 
-    @property
-    def domain(self) -> tuple[Range, Range]:
-        """((u0, u1), (v0, v1)); infinite where unbounded."""
-        return self.u, self.v
+    def profile(self, v: Array, order: int) -> tuple[Array, Array]:
+        """(..., 1) the derivatives of the given order of radius and height."""
+        return np.full((*v.shape, 1), self.radius if order == 0 else 0.0), line(v, order)
 
-    def __call__(self, u: npt.ArrayLike, v: npt.ArrayLike, nu: tuple[int, int] = (0, 0)) -> Array:
-        """(..., 3) the mixed derivative of order `nu` at broadcast parameters."""
-        us, vs = parameters(self.domain, u, v, nu)
-        a, b = nu
-        out = np.zeros((*us.shape, 3))
-        if b == 0:
-            out += self.radius * (cosine(us, a) * self.xdir + sine(us, a) * self.ydir)
-        if a == 0 and b <= 1:
-            out += self.origin + vs[..., None] * self.axis if b == 0 else self.axis
-        return out
-
-    def to_nurbs(self) -> NurbsSurface:
-        """The bounded piece: rational quadratic in u, linear in v; the parameters agree at the knots.
-
-        Raises
-        ------
-        ParameterError : the piece is unbounded.
-        """
-        bounded(self.domain, "cylinder")
-        knots, net = arc_net(self.u)
-        w = np.repeat(net[:, 2:], 2, axis=1)
-        ring = (net[:, :1] * self.xdir + net[:, 1:2] * self.ydir) / net[:, 2:]
-        line = self.origin + np.array(self.v)[:, None] * self.axis
-        return NurbsSurface((2, 1), (knots, np.repeat(self.v, 2)), line + self.radius * ring[:, None], w)
+    def profile_net(self) -> ProfileNet:
+        """The bounded profile: a line along the axis."""
+        return ProfileNet(1, np.repeat(self.v, 2), np.full(2, self.radius), np.array(self.v), np.ones(2))

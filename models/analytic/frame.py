@@ -98,3 +98,8 @@ def cosine(t: Array, order: int) -> Array:
 def sine(t: Array, order: int) -> Array:
     """(..., 1) the derivative of the given order of sin t."""
     return np.asarray((np.sin(t), np.cos(t), -np.sin(t), -np.cos(t))[order % 4][..., None])
+
+
+def line(t: Array, order: int) -> Array:
+    """(..., 1) the derivative of the given order of t itself."""
+    return np.asarray(t[..., None]) if order == 0 else np.full((*t.shape, 1), 1.0 if order == 1 else 0.0)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import numpy as np
 import numpy.typing as npt
 
 from patchwright.models.analytic.arc import arc_net
@@ -15,22 +14,21 @@ from patchwright.models.analytic.frame import (
     across,
     cosine,
     interval,
-    parameters,
     point,
     positive,
     sine,
     unit,
 )
+from patchwright.models.analytic.revolution import ProfileNet, Revolution
 from patchwright.models.arrays import Array
 from patchwright.models.errors import ParameterError
 from patchwright.models.knots import ROUND_OFF
-from patchwright.models.nurbs_surface import NurbsSurface
 
 LATITUDES = (-0.5 * math.pi, 0.5 * math.pi)
 
 
 @dataclass(frozen=True, slots=True, eq=False, init=False)
-class Sphere:
+class Sphere(Revolution):
     """S(u, v) = center + radius (cos v (x cos u + y sin u) + z sin v); the normal S_u x S_v points outwards.
 
     Parameters
@@ -75,32 +73,16 @@ class Sphere:
         put(self, "v", (max(low, LATITUDES[0]), min(high, LATITUDES[1])))
 
     @property
-    def ydir(self) -> Array:
-        """(3,) where u is a quarter turn."""
-        return np.cross(self.axis, self.xdir)
+    def middle(self) -> Array:
+        """(3,) the center."""
+        return self.center
 
-    @property
-    def domain(self) -> tuple[Range, Range]:
-        """((u0, u1), (v0, v1))."""
-        return self.u, self.v
+    def profile(self, v: Array, order: int) -> tuple[Array, Array]:
+        """(..., 1) the derivatives of the given order of radius and height."""
+        return self.radius * cosine(v, order), self.radius * sine(v, order)
 
-    def __call__(self, u: npt.ArrayLike, v: npt.ArrayLike, nu: tuple[int, int] = (0, 0)) -> Array:
-        """(..., 3) the mixed derivative of order `nu` at broadcast parameters."""
-        us, vs = parameters(self.domain, u, v, nu)
-        a, b = nu
-        ring = cosine(us, a) * self.xdir + sine(us, a) * self.ydir
-        out = self.radius * cosine(vs, b) * ring
-        if a == 0:
-            out += self.radius * sine(vs, b) * self.axis
-        if (a, b) == (0, 0):
-            out += self.center
-        return out
-
-    def to_nurbs(self) -> NurbsSurface:
-        """The piece, rational biquadratic; the parameters agree at the knots, a pole is one point repeated."""
-        (U, round_), (V, up) = arc_net(self.u), arc_net(self.v)
-        w = round_[:, 2:] * up[:, 2]
-        ring = (round_[:, :1] * self.xdir + round_[:, 1:2] * self.ydir) / round_[:, 2:]
-        out, along = up[:, 0] / up[:, 2], up[:, 1] / up[:, 2]
-        points = self.center + self.radius * (out[:, None] * ring[:, None] + along[:, None] * self.axis)
-        return NurbsSurface((2, 2), (U, V), points, w)
+    def profile_net(self) -> ProfileNet:
+        """The profile: an arc of latitudes."""
+        knots, net = arc_net(self.v)
+        along = self.radius * net[:, :2] / net[:, 2:]
+        return ProfileNet(2, knots, along[:, 0], along[:, 1], net[:, 2])

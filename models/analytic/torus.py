@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
 import numpy.typing as npt
 
 from patchwright.models.analytic.arc import arc_net
@@ -14,18 +13,17 @@ from patchwright.models.analytic.frame import (
     across,
     cosine,
     interval,
-    parameters,
     point,
     positive,
     sine,
     unit,
 )
+from patchwright.models.analytic.revolution import ProfileNet, Revolution
 from patchwright.models.arrays import Array
-from patchwright.models.nurbs_surface import NurbsSurface
 
 
 @dataclass(frozen=True, slots=True, eq=False, init=False)
-class Torus:
+class Torus(Revolution):
     """S(u, v) = center + (major_radius + minor_radius cos v) (x cos u + y sin u) + minor_radius sin v z.
 
     The normal S_u x S_v points out of the tube. A minor radius at or above the major one gives a torus that meets
@@ -72,33 +70,17 @@ class Torus:
         put(self, "v", interval(v, (0.0, TURN), "v", TURN))
 
     @property
-    def ydir(self) -> Array:
-        """(3,) where u is a quarter turn."""
-        return np.cross(self.axis, self.xdir)
+    def middle(self) -> Array:
+        """(3,) the center."""
+        return self.center
 
-    @property
-    def domain(self) -> tuple[Range, Range]:
-        """((u0, u1), (v0, v1))."""
-        return self.u, self.v
+    def profile(self, v: Array, order: int) -> tuple[Array, Array]:
+        """(..., 1) the derivatives of the given order of radius and height."""
+        away = self.major_radius if order == 0 else 0.0
+        return away + self.minor_radius * cosine(v, order), self.minor_radius * sine(v, order)
 
-    def __call__(self, u: npt.ArrayLike, v: npt.ArrayLike, nu: tuple[int, int] = (0, 0)) -> Array:
-        """(..., 3) the mixed derivative of order `nu` at broadcast parameters."""
-        us, vs = parameters(self.domain, u, v, nu)
-        a, b = nu
-        ring = cosine(us, a) * self.xdir + sine(us, a) * self.ydir
-        out = (self.minor_radius * cosine(vs, b) + (self.major_radius if b == 0 else 0.0)) * ring
-        if a == 0:
-            out += self.minor_radius * sine(vs, b) * self.axis
-        if (a, b) == (0, 0):
-            out += self.center
-        return out
-
-    def to_nurbs(self) -> NurbsSurface:
-        """The piece, rational biquadratic; the parameters agree at the knots."""
-        (U, round_), (V, tube) = arc_net(self.u), arc_net(self.v)
-        w = round_[:, 2:] * tube[:, 2]
-        ring = (round_[:, :1] * self.xdir + round_[:, 1:2] * self.ydir) / round_[:, 2:]
-        out = self.major_radius + self.minor_radius * tube[:, 0] / tube[:, 2]
-        along = self.minor_radius * tube[:, 1] / tube[:, 2]
-        points = self.center + out[:, None] * ring[:, None] + along[:, None] * self.axis
-        return NurbsSurface((2, 2), (U, V), points, w)
+    def profile_net(self) -> ProfileNet:
+        """The profile: an arc round the tube."""
+        knots, net = arc_net(self.v)
+        along = self.minor_radius * net[:, :2] / net[:, 2:]
+        return ProfileNet(2, knots, self.major_radius + along[:, 0], along[:, 1], net[:, 2])
