@@ -154,7 +154,7 @@ def bridge(
     triangulation: Triangulation, rims: tuple[Border, ...], singles: list[int], pairs: list[tuple[int, int]]
 ) -> Bridged:
     """Fill the rims `singles` each by itself and join each of `pairs` by a strip; indices count in `rims`."""
-    used = _Edges(triangulation)
+    used = _Edges.of(triangulation)
     corners: list[IntArray] = []
     parents: list[IntArray] = []
     bridges: list[Bridge] = []
@@ -185,20 +185,34 @@ def bridge(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Edges:
-    """Looks up which vertices of a loop are joined by an edge already."""
+    """Looks up which vertices of a loop are joined by an edge already; a look costs what the loop's own edges cost.
 
-    triangulation: Triangulation
+    `offsets` and `neighbours` list the vertices joined to each vertex; `place` (n,) is -1 between two looks.
+    """
+
+    offsets: IntArray
+    neighbours: IntArray
+    place: IntArray
+
+    @classmethod
+    def of(cls, triangulation: Triangulation) -> _Edges:
+        n = len(triangulation.vertices)
+        a = triangulation.triangles.reshape(-1)
+        b = np.roll(triangulation.triangles, -1, axis=1).reshape(-1)
+        start, end = np.concatenate([a, b]), np.concatenate([b, a])
+        offsets = np.concatenate([[0], np.cumsum(np.bincount(start, minlength=n))])
+        return cls(offsets, end[np.argsort(start, kind="stable")], np.full(n, -1, dtype=np.int64))
 
     def chords(self, loop: IntArray) -> BoolArray:
-        place = np.full(len(self.triangulation.vertices), -1, dtype=np.int64)
-        place[loop] = np.arange(len(loop))
-        local = place[self.triangulation.triangles]
-        local = local[(local >= 0).sum(axis=1) >= 2]
+        """(n, n) whether an edge joins two of the n vertices of a loop."""
+        self.place[loop] = np.arange(len(loop))
+        count = self.offsets[loop + 1] - self.offsets[loop]
+        row = np.repeat(np.arange(len(loop)), count)
+        local = np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count)
+        other = self.place[self.neighbours[self.offsets[loop][row] + local]]
+        self.place[loop] = -1
         joined = np.zeros((len(loop), len(loop)), dtype=np.bool_)
-        for k in range(3):
-            a, b = local[:, k], local[:, (k + 1) % 3]
-            both = (a >= 0) & (b >= 0)
-            joined[a[both], b[both]] = joined[b[both], a[both]] = True
+        joined[row[other >= 0], other[other >= 0]] = True
         return joined
 
 

@@ -154,8 +154,8 @@ class Paths:
         begin, end = onto_crest(begin), onto_crest(end)
         steep = bend[self.edges].max(axis=1) / float(bend[piece].min())
         graph = self.graph(self.length * steep**KEEP_TO_CREST, piece)
-        came = dijkstra(graph, directed=False, indices=begin, return_predecessors=True)[1]
-        return piece[_walk_back(came, end)]
+        came = dijkstra(graph, directed=False, indices=np.array([begin]), return_predecessors=True)[1]
+        return piece[_walk_back(came[0], end)]
 
     def attached(self, spine: IntArray, curve: IntArray, bend: Array, points: Array, limit: float) -> IntArray:
         """A spine with its ends led on along the crest to the feature curves nearer than `limit` and a step."""
@@ -171,11 +171,11 @@ class Paths:
             ways = self.between(near)
             steep = np.minimum(bend[ways.edges].max(axis=1), limit) / steepest
             graph = ways.graph(ways.length * steep**KEEP_TO_CREST, inside)
-            start = int(np.flatnonzero(inside == tip)[0])
+            start = np.flatnonzero(inside == tip)
             away, came = dijkstra(graph, directed=False, indices=start, return_predecessors=True)
             ends = np.flatnonzero(np.isin(inside, curve))
-            if len(ends) and np.isfinite(away[ends]).any():
-                way = _walk_back(came, int(ends[away[ends].argmin()]))
+            if len(ends) and np.isfinite(away[0, ends]).any():
+                way = _walk_back(came[0], int(ends[away[0, ends].argmin()]))
                 spine = np.concatenate([spine, inside[way[1:]]])
             spine = spine[::-1]
         return spine
