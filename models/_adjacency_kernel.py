@@ -7,8 +7,8 @@ Each public function makes the arrays and its kernel fills them: allocating insi
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from patchwright.models._compile_kernel import filling
 from patchwright.models.arrays import BoolArray, IntArray
 
 
@@ -32,7 +32,7 @@ def unique_edges(triangles: IntArray, count: int) -> tuple[IntArray, IntArray, I
     return edges[:e].copy(), triangle_edges, offsets[: e + 1].copy(), around, neighbours, inconsistent[:e].copy()
 
 
-@njit(cache=True, nogil=True)
+@filling
 def _unique_edges(
     triangles: IntArray,
     count: int,
@@ -116,7 +116,7 @@ def component_labels(offsets: IntArray, around: IntArray) -> IntArray:
     return parent
 
 
-@njit(cache=True, nogil=True)
+@filling
 def _component_labels(offsets: IntArray, around: IntArray, parent: IntArray) -> None:
     for e in range(offsets.shape[0] - 1):
         a = around[offsets[e]]
@@ -166,7 +166,7 @@ def chains(tail: IntArray, head: IntArray, count: int) -> tuple[IntArray, IntArr
     return offsets[: done + 1].copy(), vertices[: offsets[done]].copy(), closed[:done].copy()
 
 
-@njit(cache=True, nogil=True)
+@filling
 def _chains(
     tail: IntArray,
     head: IntArray,

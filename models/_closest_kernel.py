@@ -5,13 +5,13 @@ another."""
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from patchwright.models._compile_kernel import kernel
 from patchwright.models._nurbs_kernel import find_span, general_sums, quotient
 from patchwright.models.arrays import Array, IntArray
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def polish(
     U: Array,
     p: int,

@@ -9,14 +9,14 @@ floating-point arithmetic", Discrete & Computational Geometry 18, 1997). Exact b
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from patchwright.models._compile_kernel import inner, making
 from patchwright.models.arrays import Array
 
 LONGEST = 200  # terms of a determinant: 6 products of three two-term factors, four terms each
 
 
-@njit(cache=True, nogil=True)
+@inner
 def two_product_tail(a: float, b: float, p: float) -> float:
     """a b - p exactly, for p = fl(a b) (Dekker 1971)."""
     c = 134217729.0 * a
@@ -28,14 +28,14 @@ def two_product_tail(a: float, b: float, p: float) -> float:
     return al * bl - (((p - ah * bh) - al * bh) - ah * bl)
 
 
-@njit(cache=True, nogil=True)
+@inner
 def difference_tail(a: float, b: float, d: float) -> float:
     """a - b exactly, less d = fl(a - b)."""
     z = d - a
     return (a - (d - z)) + (-b - z)
 
 
-@njit(cache=True, nogil=True)
+@inner
 def grow(expansion: Array, n: int, term: float) -> int:
     """Add a number to an expansion of n terms; the new count of terms, none of them zero."""
     if term == 0.0:
@@ -56,12 +56,12 @@ def grow(expansion: Array, n: int, term: float) -> int:
     return kept
 
 
-@njit(cache=True, nogil=True)
+@making
 def determinant(rows: Array, tails: Array) -> float:
     """det(rows + tails), (3, 3) each, with the sign it has in exact arithmetic."""
     expansion = np.empty(LONGEST)
     part = np.empty(4)
-    n = 0
+    n = np.int64(0)
     # one flat loop whose length the compiler does not know: unrolled it would take it many seconds
     for term in range(16 * rows.shape[0]):
         k, a, b, c = term >> 4, (term >> 1) & 1, (term >> 2) & 1, (term >> 3) & 1

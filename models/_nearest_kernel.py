@@ -3,9 +3,11 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numba import njit
+from typing import Any
 
+import numpy as np
+
+from patchwright.models._compile_kernel import filling, inner
 from patchwright.models._tree_kernel import STACK, Boxes, Index
 from patchwright.models.arrays import Array, IntArray
 
@@ -13,7 +15,7 @@ SLACK = 1.0 - 4e-15  # on squared distances to boxes: more than their rounding
 NEEDLE = 1e-6  # squared sine below which a triangle's own sides are asked too
 
 
-@njit(cache=True, nogil=True)
+@inner
 def on_segment(
     px: float, py: float, pz: float, ax: float, ay: float, az: float, bx: float, by: float, bz: float
 ) -> float:
@@ -25,7 +27,7 @@ def on_segment(
     return min(max(((px - ax) * ex + (py - ay) * ey + (pz - az) * ez) / length, 0.0), 1.0)
 
 
-@njit(cache=True, nogil=True)
+@inner
 def closest_on_triangle(corners: Array, i: int, px: float, py: float, pz: float) -> tuple[float, float, float, float]:
     """Squared distance and barycentric coordinates of the closest point; degenerate ones are segments."""
     ax, ay, az = corners[i, 0], corners[i, 1], corners[i, 2]
@@ -81,8 +83,13 @@ def closest_on_triangle(corners: Array, i: int, px: float, py: float, pz: float)
     return best, wa, wb, wc
 
 
-@njit(cache=True, nogil=True)
-def closest_points(
+def closest_points(*arguments: Any) -> None:
+    """`_closest_points` with room of its own, so that threads may call it side by side."""
+    _closest_points(*arguments, np.empty(STACK, np.int32), np.empty(STACK))
+
+
+@filling
+def _closest_points(
     boxes: Boxes,
     child: Index,
     corners: Array,
@@ -94,12 +101,13 @@ def closest_points(
     distance: Array,
     triangle: IntArray,
     barycentric: Array,
+    stack: Index,
+    bound: Array,
 ) -> None:
     """Closest points of the points `order`; the winner of one is the first candidate of the next."""
-    stack = np.empty(STACK, np.int32)
-    bound = np.empty(STACK)
-    row = 0
-    for r in order:
+    row = np.int64(0)
+    for n in range(order.shape[0]):
+        r = order[n]
         px, py, pz = points[r, 0], points[r, 1], points[r, 2]
         qx, qy, qz = px - center[0], py - center[1], pz - center[2]
         best, wa, wb, wc = closest_on_triangle(corners, row, px, py, pz)

@@ -12,6 +12,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from patchwright.models._compile_kernel import inner, kernel, making
 from patchwright.models.arrays import Array, IntArray
 
 
@@ -29,7 +30,7 @@ def find_span(U: Array, p: int, n: int, u: float) -> int:
     return low
 
 
-@njit(cache=True, nogil=True)
+@inner
 def basis_row(U: Array, p: int, i: int, u: float, order: int, rows: Array, at: int) -> None:
     """rows[at, 0..p] = derivative of the given order of N_{i-p..i, p} at u."""
     if order > p:
@@ -55,7 +56,7 @@ def basis_row(U: Array, p: int, i: int, u: float, order: int, rows: Array, at: i
         rows[at, k] = saved
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def basis_table(U: Array, p: int, u: Array, order: int) -> tuple[IntArray, Array]:
     """First active index (k,) and basis rows (order + 1, k, p + 1) of derivatives 0..order at the parameters u."""
     n = U.shape[0] - p - 1
@@ -70,7 +71,7 @@ def basis_table(U: Array, p: int, u: Array, order: int) -> tuple[IntArray, Array
     return first, rows.reshape(order + 1, count, p + 1)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def banded_product(first: IntArray, rows: Array, net: Array) -> Array:
     """(k, c) sums over r of rows[k, r] * net[first[k] + r, :] for a net of (n, c)."""
     count, width = rows.shape
@@ -88,7 +89,7 @@ def banded_product(first: IntArray, rows: Array, net: Array) -> Array:
     return out
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def tensor_product(
     first_u: IntArray, rows_u: Array, first_v: IntArray, rows_v: Array, net: Array, divide: bool
 ) -> Array:
@@ -152,7 +153,7 @@ def tensor_product(
     return out
 
 
-@njit(cache=True, nogil=True)
+@making
 def cubic_table(U: Array, n: int, low: int, high: int) -> Array:
     """(n, high + 1 - low, 4, 4) the derivatives low..high of the four cubics of each span as powers of its own t in
     [0, 1].
@@ -163,13 +164,14 @@ def cubic_table(U: Array, n: int, low: int, high: int) -> Array:
     """
     table = np.zeros((n, high + 1 - low, 4, 4))
     row = np.empty((1, 4))
+    cubic, first = np.int64(3), np.int64(0)
     for i in range(3, n):
         h = U[i + 1] - U[i]
         if h <= 0.0:
             continue
         taylor = 1.0  # h^k / k!
         for k in range(4):
-            basis_row(U, 3, i, U[i], k, row, 0)
+            basis_row(U, cubic, i, U[i], k, row, first)
             fall = taylor  # h^(k - r) / (k - r)!
             for r in range(min(k, high) + 1):
                 if r >= low:
@@ -180,7 +182,7 @@ def cubic_table(U: Array, n: int, low: int, high: int) -> Array:
     if n > 0:
         i = find_span(U, 3, n, U[n])
         for r in range(low, high + 1):
-            basis_row(U, 3, i, U[n], r, row, 0)
+            basis_row(U, cubic, i, U[n], r, row, first)
             for j in range(4):
                 table[0, r - low, 0, j] = row[0, j]
     return table
@@ -213,7 +215,7 @@ def bicubic_sum(
     )
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def bicubic_points(U: Array, V: Array, net: Array, u: Array, v: Array) -> Array:
     """(k, 3) points of a rational bicubic net (n, m, 4) at the parameters u, v, each (k,): the case that is asked
     for most."""
@@ -234,7 +236,7 @@ def bicubic_points(U: Array, V: Array, net: Array, u: Array, v: Array) -> Array:
     return out
 
 
-@njit(cache=True, nogil=True)
+@inner
 def general_sums(
     U: Array, p: int, i: int, u: float, V: Array, q: int, j: int, v: float, net: Array,
     a: tuple[int, int], b: tuple[int, int], rows_u: Array, rows_v: Array, sums: Array,
@@ -259,7 +261,7 @@ def general_sums(
                     sums[e, f, x] += rows_u[e, r] * total
 
 
-@njit(cache=True, nogil=True)
+@inner
 def quotient(sums: Array, a1: int, b1: int, binomial: Array) -> None:
     """Turn homogeneous derivatives sums[e, f, 0..3] into those of the quotient, in place (4.20)."""
     scale = 1.0 / sums[0, 0, 3]
@@ -275,7 +277,7 @@ def quotient(sums: Array, a1: int, b1: int, binomial: Array) -> None:
                 sums[e, f, x] *= scale
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def scattered(
     U: Array, p: int, V: Array, q: int, net: Array, u: Array, v: Array, lowest: tuple[int, int], order: tuple[int, int]
 ) -> Array:
@@ -331,7 +333,7 @@ def scattered(
     return out
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def refine(U: Array, p: int, net: Array, X: Array, a: int, b: int) -> tuple[Array, Array]:
     """Insert the sorted knots X into a net of (n, c): the new knots and net (A5.4; every step a convex combination).
 

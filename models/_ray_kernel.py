@@ -3,9 +3,11 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numba import njit
+from typing import Any
 
+import numpy as np
+
+from patchwright.models._compile_kernel import filling, inlined, inner, kernel, making
 from patchwright.models._exact_kernel import determinant, difference_tail
 from patchwright.models._tree_kernel import STACK, Boxes, Index
 from patchwright.models.arrays import Array, IntArray
@@ -19,7 +21,7 @@ WIDEN = 1.0 + 1e-6  # of the best distance, likewise
 ROUNDING = 3e-15  # of an edge function against the lengths in it: 24 units in the last place
 
 
-@njit(cache=True, nogil=True)
+@inner
 def radius_of(boxes: Boxes) -> float:
     """The radius about the centre that holds the tree."""
     size = 0.0
@@ -29,7 +31,7 @@ def radius_of(boxes: Boxes) -> float:
     return np.sqrt(3.0) * size
 
 
-@njit(cache=True, nogil=True)
+@inner
 def ray_frame(direction: Array) -> tuple[int, int, int, float, float]:
     """Axes permuted so that the longest comes last, and the shear that turns the direction into it (Woop 2013)."""
     kz = 0
@@ -40,7 +42,7 @@ def ray_frame(direction: Array) -> tuple[int, int, int, float, float]:
     return kx, ky, kz, direction[kx] / direction[kz], direction[ky] / direction[kz]
 
 
-@njit(cache=True, nogil=True)
+@making
 def exact(corners: Array, i: int, what: int, points: Array, r: int, frame: Array) -> float:
     """An edge function of row i against ray r (`what` 0, 1, 2: opposite that corner) or the side r lies on (`what` 3).
 
@@ -62,7 +64,7 @@ def exact(corners: Array, i: int, what: int, points: Array, r: int, frame: Array
     return determinant(rows, tails) / (largest if what < 3 else 1.0)
 
 
-@njit(cache=True, nogil=True)
+@making
 def settle(
     corners: Array, i: int, origins: Array, r: int, frame: Array, u: float, v: float, w: float, error: float
 ) -> tuple[float, float, float, float]:
@@ -79,7 +81,7 @@ def settle(
     return -value[3] / total, u / total, v / total, w / total
 
 
-@njit(cache=True, nogil=True, forceinline=True)
+@inlined
 def ray_triangle(
     corners: Array, i: int, origins: Array, r: int, frame: Array, kx: int, ky: int, kz: int, sx: float, sy: float
 ) -> tuple[float, float, float, float]:
@@ -108,13 +110,13 @@ def ray_triangle(
     return depth, u / total, v / total, w / total
 
 
-@njit(cache=True, nogil=True)
+@inner
 def inverse(x: float) -> np.float32:
     """1 / x in single precision, finite."""
     return np.float32(1.0 / x if abs(x) * HUGE > 1.0 else HUGE)
 
 
-@njit(cache=True, nogil=True)
+@inner
 def approach(px: float, py: float, pz: float, dx: float, dy: float, dz: float, radius: float) -> float:
     """How far to go along a ray that starts far off before single precision will do; inf if it misses `radius`."""
     square = px * px + py * py + pz * pz
@@ -125,7 +127,7 @@ def approach(px: float, py: float, pz: float, dx: float, dy: float, dz: float, r
     return ahead if x * x + y * y + z * z <= 16.1 * radius * radius else np.inf
 
 
-@njit(cache=True, nogil=True, forceinline=True)
+@inlined
 def entry(
     boxes: Boxes,
     node: int,
@@ -147,8 +149,16 @@ def entry(
     return near if near <= far else NONE
 
 
-@njit(cache=True, nogil=True)
-def first_hits(
+def first_hits(*arguments: Any) -> None:
+    """`_first_hits` with room of its own, so that threads may call it side by side."""
+    _first_hits(
+        *arguments, np.zeros((2, 3)), np.empty(STACK, np.int32), np.empty(STACK, np.float32), np.empty((BLOCK, 3)),
+        np.empty((BLOCK, 3)),
+    )  # fmt: skip
+
+
+@filling
+def _first_hits(
     boxes: Boxes,
     child: Index,
     corners: Array,
@@ -161,17 +171,17 @@ def first_hits(
     distance: Array,
     triangle: IntArray,
     barycentric: Array,
+    frame: Array,
+    stack: Index,
+    enter: Boxes,
+    starts: Array,
+    ways: Array,
 ) -> None:
     """Nearest hit of the rays `order`; `reach` and `distance` are lengths, whatever the length of the directions.
 
     Within, ways are measured along the direction's longest axis.
     """
-    frame = np.zeros((2, 3))
-    stack = np.empty(STACK, np.int32)
-    enter = np.empty(STACK, np.float32)
     radius = radius_of(boxes)
-    starts = np.empty((BLOCK, 3))
-    ways = np.empty((BLOCK, 3))
     for n in range(order.shape[0]):
         row = n & (BLOCK - 1)
         if row == 0:
@@ -233,7 +243,7 @@ def first_hits(
         barycentric[r, 0], barycentric[r, 1], barycentric[r, 2] = wa, wb, wc
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def all_hits(
     boxes: Boxes, child: Index, corners: Array, index: Index, center: Array, start: Array, end: Array
 ) -> tuple[IntArray, Array]:
@@ -276,7 +286,7 @@ def all_hits(
             for i in range(code >> 3, (code >> 3) + (code & 7)):
                 t, u, v, w = ray_triangle(corners, i, start, r, frame, kx, ky, kz, sx, sy)
                 t /= frame[0, kz]
-                if 1.0 < t < 1.0 + ROUNDING and exact(corners, i, 3, end, r, frame) == 0.0:
+                if 1.0 < t < 1.0 + ROUNDING and exact(corners, i, np.int64(3), end, r, frame) == 0.0:
                     t = 1.0
                 if not 0.0 <= t <= 1.0:
                     continue

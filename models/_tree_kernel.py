@@ -11,8 +11,8 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
+from patchwright.models._compile_kernel import filling, inner, kernel
 from patchwright.models.arrays import Array, IntArray
 
 Boxes = npt.NDArray[np.float32]
@@ -33,7 +33,7 @@ def bounds(vertices: Array, triangles: IntArray) -> tuple[Array, Array]:
     return box[0], box[1]
 
 
-@njit(cache=True, nogil=True)
+@filling
 def _bounds(vertices: Array, triangles: IntArray, box: Array) -> None:
     """Widen `box` (2, 3) by the triangles' corners."""
     for t in range(triangles.shape[0]):
@@ -54,7 +54,7 @@ def primitive_boxes(vertices: Array, triangles: IntArray, center: Array, pad: fl
     return boxes
 
 
-@njit(cache=True, nogil=True)
+@filling
 def _primitive_boxes(vertices: Array, triangles: IntArray, center: Array, pad: float, boxes: Boxes) -> None:
     for t in range(triangles.shape[0]):
         a = triangles[t, 0]
@@ -68,7 +68,7 @@ def _primitive_boxes(vertices: Array, triangles: IntArray, center: Array, pad: f
             boxes[t, k + 3] = np.float32(max(max(x, y), z) - center[k] + pad)
 
 
-@njit(cache=True, nogil=True)
+@inner
 def clear(boxes: Boxes, i: int) -> None:
     """Make row i of `boxes` (n, 6) the empty box."""
     for k in range(3):
@@ -76,7 +76,7 @@ def clear(boxes: Boxes, i: int) -> None:
         boxes[i, k + 3] = -np.inf
 
 
-@njit(cache=True, nogil=True)
+@inner
 def widen(boxes: Boxes, i: int, by: Boxes, j: int) -> None:
     """Make box i of `boxes` hold box j of `by`."""
     for k in range(3):
@@ -86,7 +86,7 @@ def widen(boxes: Boxes, i: int, by: Boxes, j: int) -> None:
         boxes[i, k + 3] = high if high > boxes[i, k + 3] else boxes[i, k + 3]
 
 
-@njit(cache=True, nogil=True)
+@inner
 def half_area(boxes: Boxes, i: int) -> float:
     """Half the surface of box i."""
     dx = boxes[i, 3] - boxes[i, 0]
@@ -95,7 +95,7 @@ def half_area(boxes: Boxes, i: int) -> float:
     return dx * dy + dy * dz + dz * dx
 
 
-@njit(cache=True, nogil=True)
+@inner
 def partition(
     boxes: Boxes, order: Index, begin: int, end: int, bins: Boxes, count: IntArray, area: Array, halves: Boxes
 ) -> int:
@@ -183,7 +183,7 @@ def build(boxes: Boxes) -> tuple[Boxes, Index, Index]:
     return node_boxes[:nodes].copy(), child[:nodes].copy(), order
 
 
-@njit(cache=True, nogil=True)
+@filling
 def _build(
     boxes: Boxes,
     order: Index,
@@ -234,7 +234,7 @@ def _build(
     return nodes
 
 
-@njit(cache=True, nogil=True)
+@filling
 def gather(vertices: Array, triangles: IntArray, order: Index, corners: Array) -> None:
     """Fill `corners` (m, 9) with the triangles' corners in the order of the leaves."""
     for i in range(order.shape[0]):
@@ -244,33 +244,54 @@ def gather(vertices: Array, triangles: IntArray, order: Index, corners: Array) -
                 corners[i, 3 * j + k] = vertices[v, k]
 
 
-@njit(cache=True, nogil=True)
+@inner
 def extent(points: Array, low: Array) -> float:
     """The longest side of the box of `points`, whose lower corner goes to `low` (3,)."""
-    high = low.copy()
+    longest = -np.inf
     for k in range(3):
-        low[k], high[k] = np.inf, -np.inf
-    for i in range(points.shape[0]):
-        for k in range(3):
-            low[k] = min(low[k], points[i, k])
-            high[k] = max(high[k], points[i, k])
-    return max(max(high[0] - low[0], high[1] - low[1]), high[2] - low[2])
+        least = np.inf
+        most = -np.inf
+        for i in range(points.shape[0]):
+            x = points[i, k]
+            least = x if x < least else least
+            most = x if x > most else most
+        low[k] = least
+        longest = most - least if most - least > longest else longest
+    return longest
 
 
-@njit(cache=True, nogil=True)
 def morton_order(points: Array, otherwise: Array, least: float) -> IntArray:
     """(n,) an order in which successive points are near: 21-bit Morton codes, sorted by two radix passes.
 
     Where all `points` lie within `least`, the order is that of the points `otherwise`.
     """
+    n = len(points)
+    order = np.arange(n)
+    _morton_order(
+        points, otherwise, least, np.empty(3), np.zeros(n, np.int64), np.zeros((2, 2049), np.int64), order,
+        np.empty(n, np.int64),
+    )  # fmt: skip
+    return order
+
+
+@filling
+def _morton_order(
+    points: Array,
+    otherwise: Array,
+    least: float,
+    low: Array,
+    code: IntArray,
+    start: IntArray,
+    order: IntArray,
+    other: IntArray,
+) -> None:
+    """`order` is 0, 1, ... before and the order after; `code` and `start` are zeros, `start` (2, 2049)."""
     n = points.shape[0]
-    low = np.empty(3)
     size = extent(points, low)
     if size <= least:
         points = otherwise
         size = extent(points, low)
     scale = 127.0 / size if 0.0 < size < np.inf else 0.0
-    code = np.zeros(n, np.int64)
     for i in range(n):
         for k in range(3):
             x = np.int64((points[i, k] - low[k]) * scale)
@@ -278,21 +299,21 @@ def morton_order(points: Array, otherwise: Array, least: float) -> IntArray:
             x = (x | (x << 8)) & 0x0300F00F
             x = (x | (x << 4)) & 0x030C30C3
             code[i] |= ((x | (x << 2)) & 0x09249249) << k
-    order = np.arange(n)
-    other = np.empty(n, np.int64)
-    start = np.empty(2049, np.int64)
-    for digit in range(2):
-        start[:] = 0
-        for i in range(n):
-            start[((code[i] >> (11 * digit)) & 2047) + 1] += 1
-        for b in range(2048):
-            start[b + 1] += start[b]
-        for i in range(n):
-            b = (code[order[i]] >> (11 * digit)) & 2047
-            other[start[b]] = order[i]
-            start[b] += 1
-        order, other = other, order
-    return order
+    for i in range(n):
+        start[0, (code[i] & 2047) + 1] += 1
+        start[1, (code[i] >> 11) + 1] += 1
+    for b in range(2048):
+        start[0, b + 1] += start[0, b]
+        start[1, b + 1] += start[1, b]
+    for i in range(n):
+        b = code[i] & 2047
+        other[start[0, b]] = i
+        start[0, b] += 1
+    for j in range(n):
+        i = other[j]
+        b = code[i] >> 11
+        order[start[1, b]] = i
+        start[1, b] += 1
 
 
 def exact_boxes(corners: Array) -> Array:
@@ -302,7 +323,7 @@ def exact_boxes(corners: Array) -> Array:
     return boxes
 
 
-@njit(cache=True, nogil=True)
+@filling
 def _exact_boxes(corners: Array, boxes: Array) -> None:
     for i in range(corners.shape[0]):
         for k in range(3):
@@ -316,7 +337,7 @@ def _exact_boxes(corners: Array, boxes: Array) -> None:
             boxes[i, k + 3] = high
 
 
-@njit(cache=True, nogil=True)
+@inner
 def children_boxes(boxes: Boxes, exact: Array, center: Array, code: int, out: Array) -> int:
     """How many boxes stand for `code` (two for an inner node, one for a leaf), and the boxes, in the model frame."""
     if code >= 0:
@@ -334,7 +355,7 @@ def children_boxes(boxes: Boxes, exact: Array, center: Array, code: int, out: Ar
     return 1
 
 
-@njit(cache=True, nogil=True)
+@inner
 def touch(a: Array, i: int, b: Array, j: int) -> bool:
     """Whether box i of `a` and box j of `b` have a point in common."""
     apart = False
@@ -343,7 +364,7 @@ def touch(a: Array, i: int, b: Array, j: int) -> bool:
     return not apart
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def overlapping(
     a_boxes: Boxes,
     a_child: Index,

@@ -11,8 +11,8 @@ Journal of Graphics Tools 8(1), 2003, in three dimensions, and separating edges 
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from patchwright.models._compile_kernel import kernel, making
 from patchwright.models._exact_kernel import determinant, difference_tail
 from patchwright.models.arrays import Array, BoolArray, IntArray
 
@@ -20,7 +20,7 @@ PLANE_ERROR = 3.3306690738754716e-16  # (3 + 16 u) u, Shewchuk's bound of orient
 SPACE_ERROR = 7.771561172376103e-16  # (7 + 56 u) u, of orient3d
 
 
-@njit(cache=True, nogil=True)
+@making
 def orient3d(a: Array, b: Array, c: Array, d: Array) -> float:
     """det(a - d, b - d, c - d): positive where a, b, c turn clockwise seen from d; exact sign."""
     adx, ady, adz = a[0] - d[0], a[1] - d[1], a[2] - d[2]
@@ -41,7 +41,7 @@ def orient3d(a: Array, b: Array, c: Array, d: Array) -> float:
     return determinant(rows, tails)
 
 
-@njit(cache=True, nogil=True)
+@making
 def orient2d(a: Array, b: Array, c: Array, x: int, y: int, exact: bool) -> float:
     """Twice the signed area of a, b, c in the coordinates x and y; exact sign, or 0 if undecided and not `exact`."""
     acx, acy, bcx, bcy = a[x] - c[x], a[y] - c[y], b[x] - c[x], b[y] - c[y]
@@ -59,7 +59,7 @@ def orient2d(a: Array, b: Array, c: Array, x: int, y: int, exact: bool) -> float
     return determinant(rows, tails)
 
 
-@njit(cache=True, nogil=True)
+@making
 def dominant(p: Array) -> int:
     """The axis nearest a triangle's normal, such that its projection along it has area; -1 if it has none at all."""
     best, axis = -1.0, -1
@@ -70,7 +70,7 @@ def dominant(p: Array) -> int:
     return axis if best > 0.0 else -1
 
 
-@njit(cache=True, nogil=True)
+@making
 def separated(p: Array, q: Array, axis: int, shared: IntArray, exact: bool, closed: bool) -> bool:
     """Whether a side of p has all of q beyond it in the projection along `axis`.
 
@@ -98,7 +98,7 @@ def separated(p: Array, q: Array, axis: int, shared: IntArray, exact: bool, clos
     return False
 
 
-@njit(cache=True, nogil=True)
+@making
 def same_corners(p: Array, q: Array, shared: IntArray) -> int:
     """`shared[j]` becomes the corner of p equal to corner j of q, or -1; the number of equal ones."""
     found = 0
@@ -111,7 +111,7 @@ def same_corners(p: Array, q: Array, shared: IntArray) -> int:
     return found
 
 
-@njit(cache=True, nogil=True)
+@making
 def alone(sign: Array) -> tuple[int, float]:
     """The corner by itself on its side of a plane, and which side: 1 (the others are not above) or -1.
 
@@ -128,7 +128,7 @@ def alone(sign: Array) -> tuple[int, float]:
     return 0, 1.0
 
 
-@njit(cache=True, nogil=True)
+@making
 def rotated(p: Array, first: int, swap: bool, out: Array) -> None:
     """The corners of p from `first` on, the last two swapped if asked."""
     j, k = (first + 1) % 3, (first + 2) % 3
@@ -138,7 +138,7 @@ def rotated(p: Array, first: int, swap: bool, out: Array) -> None:
         out[0, x], out[1, x], out[2, x] = p[first, x], p[j, x], p[k, x]
 
 
-@njit(cache=True, nogil=True)
+@making
 def meet(p: Array, q: Array, proper: bool, above: Array, beside: Array, u: Array, v: Array, shared: IntArray) -> bool:
     """Whether two triangles with area have a point in common or, with `proper`, cross.
 
@@ -191,7 +191,7 @@ def meet(p: Array, q: Array, proper: bool, above: Array, beside: Array, u: Array
     return k_before_j <= 0.0 and i_before_l <= 0.0
 
 
-@njit(cache=True, nogil=True)
+@making
 def fetch(vertices: Array, triangles: IntArray, t: int, out: Array) -> None:
     """Corners of triangle t."""
     for i in range(3):
@@ -199,7 +199,7 @@ def fetch(vertices: Array, triangles: IntArray, t: int, out: Array) -> None:
             out[i, k] = vertices[triangles[t, i], k]
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def with_area(vertices: Array, triangles: IntArray) -> BoolArray:
     """(m,) whether a triangle's corners are exactly not in one line."""
     p = np.empty((3, 3))
@@ -210,7 +210,7 @@ def with_area(vertices: Array, triangles: IntArray) -> BoolArray:
     return good
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def meeting(
     a_vertices: Array,
     a_triangles: IntArray,
@@ -235,7 +235,7 @@ def meeting(
     return result
 
 
-@njit(cache=True, nogil=True)
+@making
 def stretch(p: Array, sign: Array, out: Array) -> None:
     """The two points in which the border of p crosses the plane its corners have the (signed) distances `sign` from."""
     first, _ = alone(sign)
@@ -247,7 +247,7 @@ def stretch(p: Array, sign: Array, out: Array) -> None:
             out[n, k] = p[first, k] + share * (p[other, k] - p[first, k])
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def segments(
     a_vertices: Array,
     a_triangles: IntArray,

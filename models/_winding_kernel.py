@@ -5,8 +5,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from patchwright.models._compile_kernel import inner, kernel
 from patchwright.models._tree_kernel import STACK, Boxes, Index
 from patchwright.models.arrays import Array, IntArray
 
@@ -14,7 +14,7 @@ from patchwright.models.arrays import Array, IntArray
 NORMAL, MIDDLE, RADIUS, AREA, FIRST, WIDTH = 0, 3, 6, 7, 8, 17
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def moments(boxes: Boxes, child: Index, corners: Array, center: Array) -> Array:
     """(2 n, 17) moments of each node's two children, in the frame about `center`."""
     n = child.shape[0]
@@ -58,7 +58,7 @@ def moments(boxes: Boxes, child: Index, corners: Array, center: Array) -> Array:
     return m
 
 
-@njit(cache=True, nogil=True)
+@inner
 def triangle_area(corners: Array, i: int, normal: Array) -> float:
     """Area of row i; `normal` becomes the area vector."""
     size = 0.0
@@ -72,7 +72,7 @@ def triangle_area(corners: Array, i: int, normal: Array) -> float:
     return np.sqrt(size)
 
 
-@njit(cache=True, nogil=True)
+@inner
 def solid_angle(corners: Array, i: int, qx: float, qy: float, qz: float) -> float:
     """Signed solid angle of row i seen from q over 2 (van Oosterom & Strackee 1983)."""
     ax, ay, az = corners[i, 0] - qx, corners[i, 1] - qy, corners[i, 2] - qz
@@ -87,7 +87,7 @@ def solid_angle(corners: Array, i: int, qx: float, qy: float, qz: float) -> floa
     return np.arctan2(volume, across)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def winding(
     child: Index, corners: Array, center: Array, m: Array, points: Array, beta: float, order: IntArray, result: Array
 ) -> None:

@@ -99,9 +99,8 @@ def repair(
     from patchwright.pipelines.recipe import repair_recipe
     from patchwright.pipelines.run import run
 
-    terminal = _warmed(quiet)
     recipe = repair_recipe(file, output, scope=scope.value, openings=openings.value, tolerance=tolerance)
-    _finish(run(recipe, terminal=terminal), json)
+    _finish(run(recipe, terminal=_terminal(quiet)), json)
 
 
 @app.command()
@@ -114,7 +113,7 @@ def demo(
     """Make a dirty aircraft, repair it, and compare the result with the known truth."""
     from patchwright.pipelines.demo import run_demo
 
-    _finish(run_demo(output, seed=seed, terminal=_warmed(quiet)), json)
+    _finish(run_demo(output, seed=seed, terminal=_terminal(quiet)), json)
 
 
 @app.command("run")
@@ -126,7 +125,7 @@ def run_(
     """Run a recipe: a TOML file with source, folder and stages."""
     from patchwright.pipelines.run import run
 
-    _finish(run(recipe, terminal=_warmed(quiet)), json)
+    _finish(run(recipe, terminal=_terminal(quiet)), json)
 
 
 @app.command()
@@ -171,15 +170,6 @@ def _terminal(quiet: bool) -> Terminal:
 
     terminal = Terminal(quiet=quiet)
     warnings.showwarning = lambda message, *rest, **more: terminal.line(f"  warning: {message}")
-    return terminal
-
-
-def _warmed(quiet: bool) -> Terminal:
-    """The terminal, with the kernels' compilation under way where this machine has never done it."""
-    from patchwright.pipelines.warm import start
-
-    terminal = _terminal(quiet)
-    start(terminal)
     return terminal
 
 

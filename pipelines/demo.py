@@ -14,6 +14,7 @@ from patchwright.pipelines.report import write_report
 from patchwright.pipelines.run import run
 from patchwright.pipelines.study import StageReport, Study
 from patchwright.pipelines.truth import against_injected, against_truth
+from patchwright.pipelines.warm import start
 
 INPUT = "dirty.stl"
 
@@ -24,6 +25,8 @@ def run_demo(folder: Path, *, seed: int = 1, terminal: Terminal | None = None) -
 
     shown = terminal or Terminal(quiet=True)
     prepare_folder(folder)
+    if terminal is not None:
+        start(terminal)
     started = time.perf_counter()
     with shown.stage("sample") as report:
         report("making a dirty aircraft", 0.2)

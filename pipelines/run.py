@@ -13,6 +13,7 @@ from patchwright.pipelines.progress import Terminal
 from patchwright.pipelines.recipe import Recipe, load_recipe
 from patchwright.pipelines.stages import STAGES
 from patchwright.pipelines.study import StageReport, Study
+from patchwright.pipelines.warm import start
 
 
 def run(recipe: Recipe | Path | str, *, assembly: Assembly | None = None, terminal: Terminal | None = None) -> Study:
@@ -46,11 +47,14 @@ def run(recipe: Recipe | Path | str, *, assembly: Assembly | None = None, termin
         raise ParameterError(f"{plan.source}: holds no faces and no triangles; there is nothing to work on")
     if count == 1 and not assembly.is_cad:
         raise ParameterError(f"{plan.source}: holds a single triangle; a surface to repair needs more than that")
+    tolerance = Tolerance.of(assembly, fit=plan.tolerance)
+    if terminal is not None:
+        start(terminal)  # not before the input is known to be good
     study = Study(
         str(plan.source),
         plan.folder,
         assembly,
-        Tolerance.of(assembly, fit=plan.tolerance),
+        tolerance,
         reports=(StageReport("read", time.perf_counter() - started),),
     )
     for step in plan.steps:

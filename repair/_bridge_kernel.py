@@ -5,8 +5,8 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
+from patchwright.models._compile_kernel import kernel, making
 from patchwright.models.arrays import Array, BoolArray, IntArray
 
 Bytes = npt.NDArray[np.uint8]
@@ -14,7 +14,7 @@ Bytes = npt.NDArray[np.uint8]
 SPREAD = 0.05  # weight of the squared length of inner edges: between equal areas the compact triangles win
 
 
-@njit(cache=True)
+@making
 def _normal(p: Array, q: Array, r: Array, out: Array) -> float:
     """Unit normal of a triangle into `out`, returns its area."""
     ax, ay, az = q[0] - p[0], q[1] - p[1], q[2] - p[2]
@@ -30,12 +30,12 @@ def _normal(p: Array, q: Array, r: Array, out: Array) -> float:
     return 0.5 * size
 
 
-@njit(cache=True)
+@making
 def _square(p: Array, q: Array) -> float:
     return (p[0] - q[0]) ** 2 + (p[1] - q[1]) ** 2 + (p[2] - q[2]) ** 2
 
 
-@njit(cache=True)
+@making
 def _turn(n: Array, k: Array) -> float:
     """1 - cos of the angle between two normals; 0 where one of them is missing."""
     if (n[0] == 0.0 and n[1] == 0.0 and n[2] == 0.0) or (k[0] == 0.0 and k[1] == 0.0 and k[2] == 0.0):
@@ -63,7 +63,7 @@ def fill_loop(points: Array, normals: Array, forbidden: BoolArray) -> IntArray:
     return triangles if np.isfinite(cost[0, n - 1]) else np.empty((0, 3), dtype=np.int64)
 
 
-@njit(cache=True)
+@kernel
 def _fill_loop(
     points: Array,
     normals: Array,
@@ -131,7 +131,7 @@ def narrowest(points: Array, forbidden: BoolArray) -> tuple[int, int]:
     return found
 
 
-@njit(cache=True)
+@kernel
 def _narrowest(points: Array, along: Array, forbidden: BoolArray) -> tuple[int, int]:
     n = len(points)
     best = np.inf
@@ -165,7 +165,7 @@ def strip(p: Array, q: Array, p_normals: Array, q_normals: Array) -> tuple[float
     return float(row[m]), moves
 
 
-@njit(cache=True)
+@kernel
 def _strip(
     p: Array, q: Array, p_normals: Array, q_normals: Array, came: Bytes, row: Array, mine: Array, moves: IntArray
 ) -> None:

@@ -4,8 +4,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from patchwright.models._compile_kernel import filling
 from patchwright.models.arrays import Array, BoolArray, IntArray
 
 
@@ -27,7 +27,7 @@ def sector_partners(
     return left[:count].copy(), right[:count].copy()
 
 
-@njit(cache=True)
+@filling
 def _sector_partners(
     edges: IntArray,
     offsets: IntArray,
@@ -144,7 +144,7 @@ def fans(triangles: IntArray, neighbours: IntArray, left: IntArray, right: IntAr
     return label.reshape(-1, 3)
 
 
-@njit(cache=True)
+@filling
 def _fans(
     triangles: IntArray,
     neighbours: IntArray,

@@ -4,8 +4,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from patchwright.models._compile_kernel import filling
 from patchwright.models.arrays import Array, IntArray
 
 
@@ -33,7 +33,7 @@ def nearest_edges(
     return edge, at, gap
 
 
-@njit(cache=True)
+@filling
 def _nearest_edges(
     rim: IntArray,
     points: Array,

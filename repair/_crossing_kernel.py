@@ -4,12 +4,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from patchwright.models._compile_kernel import filling, inner
 from patchwright.models.arrays import Array, BoolArray, IntArray
 
 
-@njit(cache=True)
+@inner
 def _volume(points: Array, a: int, b: int, c: int, d: int) -> float:
     ax = points[a, 0]
     ay = points[a, 1]
@@ -26,12 +26,12 @@ def _volume(points: Array, a: int, b: int, c: int, d: int) -> float:
     return wx * (uy * vz - uz * vy) + wy * (uz * vx - ux * vz) + wz * (ux * vy - uy * vx)
 
 
-@njit(cache=True)
+@inner
 def _height(points: Array, p: int, a: int, nx: float, ny: float, nz: float) -> float:
     return (points[p, 0] - points[a, 0]) * nx + (points[p, 1] - points[a, 1]) * ny + (points[p, 2] - points[a, 2]) * nz
 
 
-@njit(cache=True)
+@inner
 def _pierces(points: Array, p: int, q: int, a: int, b: int, c: int, depth: float) -> bool:
     """Whether the segment p q passes through the inside of a b c, both ends farther than `depth` from its plane."""
     ux = points[b, 0] - points[a, 0]
@@ -70,7 +70,7 @@ def crossing(pairs: IntArray, points: Array, triangles: IntArray, depth: float) 
     return found
 
 
-@njit(cache=True)
+@filling
 def _crossing(pairs: IntArray, points: Array, triangles: IntArray, depth: float, found: BoolArray) -> None:
     for at in range(len(pairs)):
         shared = 0

@@ -4,8 +4,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from patchwright.models._compile_kernel import filling
 from patchwright.models.arrays import BoolArray, IntArray
 
 
@@ -19,7 +19,7 @@ def walk(triangles: IntArray, neighbours: IntArray) -> tuple[IntArray, BoolArray
     return component, turn, bad
 
 
-@njit(cache=True)
+@filling
 def _walk(
     triangles: IntArray, neighbours: IntArray, component: IntArray, turn: BoolArray, bad: BoolArray, stack: IntArray
 ) -> None:

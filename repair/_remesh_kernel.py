@@ -19,6 +19,7 @@ _RING = 512  # most triangles round a vertex; a vertex with more is left alone
 _FACING = 0.34  # cosine of 70 degrees: how far a triangle may turn from the surface's normal at its corners
 _GOOD = 0.25  # quality (1 is equilateral) that is never asked to be bettered
 _LENGTHENED = 1.05  # how much a collapse may lengthen an edge that is too long already
+_HALF = 0.8  # longest half of a split edge against the edge
 _REFUSED = -9.0  # score of a collapse that is not allowed; below any quality
 
 
@@ -255,7 +256,7 @@ def collapse_score(m, g, v, w, ring, ring_w, limit):
             if state == 0:
                 worst_old = min(worst_old, value)
             elif state == 1:
-                if value == 0.0 or value > 0.0 and value < min(_GOOD, worst_old):
+                if value == 0.0 or 0.0 < value < min(_GOOD, worst_old):
                     return _REFUSED
                 worst_new = min(worst_new, value)
             else:
@@ -534,8 +535,12 @@ def place_on_ground(m, g, v, x, y, z, t):
 
 
 @inner
-def split_edge(m, g, t, k, vertices, triangles, starts):
-    """Put vertex `vertices` into side k of t, with new triangles from `triangles` on; whether that could be done."""
+def split_edge(m, g, t, k, vertices, triangles, starts, long):
+    """Put vertex `vertices` into side k of t, with new triangles from `triangles` on; whether that could be done.
+
+    A `long` edge is split even where a half is turned against the surface: slivers along a bent surface can be mended
+    only once they are short.
+    """
     B, T, F, R, X, v2t = m.B, m.T, m.F, m.R, m.X, m.v2t
     o = B[t, k]
     a, b, c = T[t, k], T[t, (k + 1) % 3], T[t, (k + 2) % 3]
@@ -546,7 +551,10 @@ def split_edge(m, g, t, k, vertices, triangles, starts):
     p = vertices
     if F[t, k] >= 0:
         curve = F[t, k]
-        place_on_curve(m, g, p, curve, 0.5 * (arc_at(m, g, a, curve, b) + arc_at(m, g, b, curve, a)))
+        one, two = arc_at(m, g, a, curve, b), arc_at(m, g, b, curve, a)
+        if one == two:
+            return False
+        place_on_curve(m, g, p, curve, 0.5 * (one + two))
     else:
         n = np.int64(0)
         for x in (a, b, c, d):
@@ -562,6 +570,9 @@ def split_edge(m, g, t, k, vertices, triangles, starts):
         if at < 0:
             return False
         place_on_ground(m, g, p, x, y, z, at)
+        # halves hardly shorter than the whole would be split without end
+        if max(distance(m, a, p), distance(m, p, b)) > _HALF * distance(m, a, b):
+            return False
     for half in range(2):
         tri = t if half == 0 else o
         if tri < 0:
@@ -574,7 +585,7 @@ def split_edge(m, g, t, k, vertices, triangles, starts):
             good = quality(m, g, i, j, c if half == 0 else d, R[tri], np.int64(1)) > 0.0
             if piece == 0:
                 sound = good
-            elif sound and not good:
+            elif sound and not good and not long:
                 return False
     curve = F[t, k]
     n1, n2 = triangles, triangles + 1
@@ -619,7 +630,7 @@ def split_pass(m, g, vertices, triangles, limit):
                         if vertices + 1 > len(m.X) or triangles + 2 > len(m.T):
                             return vertices, triangles
                         inner = m.B[t, k] >= 0
-                        if split_edge(m, g, t, k, vertices, triangles, starts):
+                        if split_edge(m, g, t, k, vertices, triangles, starts, scale > 1.0):
                             vertices += 1
                             triangles += 2 if inner else 1
                             break

@@ -4,8 +4,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from patchwright.models._compile_kernel import filling, inner
 from patchwright.models.arrays import Array, IntArray
 
 
@@ -52,7 +52,7 @@ def facing(
     return found, way
 
 
-@njit(cache=True)
+@inner
 def _box_distance(low: Array, high: Array, a_low: Array, a_high: Array, i: int, j: int) -> float:
     """Squared distance of box i of `a` from box j."""
     apart = 0.0
@@ -63,7 +63,7 @@ def _box_distance(low: Array, high: Array, a_low: Array, a_high: Array, i: int, 
     return apart
 
 
-@njit(cache=True)
+@filling
 def _facing(
     points: Array,
     outward: Array,
@@ -172,7 +172,7 @@ def nearest_other(
     return chord, place, best
 
 
-@njit(cache=True)
+@filling
 def _nearest_other(
     points: Array,
     owner: IntArray,

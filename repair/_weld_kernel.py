@@ -4,15 +4,15 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from patchwright.models._compile_kernel import filling, inner
 from patchwright.models.arrays import Array, IntArray
 
 CANDIDATES = 6  # nearest free edges kept per free edge
 NOWHERE = -10000  # level of the grid for an edge that reaches nowhere
 
 
-@njit(cache=True)
+@inner
 def _mix(h: int) -> int:
     h ^= h >> 33
     h *= -49064778989728563
@@ -37,7 +37,7 @@ def _slots(n: int) -> int:
     return size
 
 
-@njit(cache=True)
+@filling
 def _merge_exact(bits: IntArray, table: IntArray, first: IntArray) -> None:
     size = len(table)
     for i in range(len(bits)):
@@ -54,7 +54,7 @@ def _merge_exact(bits: IntArray, table: IntArray, first: IntArray) -> None:
             slot = (slot + 1) & (size - 1)
 
 
-@njit(cache=True)
+@inner
 def _cell(level: int, i: int, j: int, k: int) -> int:
     return _mix(_mix(_mix(level * 73856093 + i) ^ (j * 19349663)) ^ (k * 83492791))
 
@@ -92,7 +92,7 @@ def edge_candidates(
     return partner, gap, kind
 
 
-@njit(cache=True)
+@filling
 def _sort_cells(levels: IntArray, cells: IntArray, keys: IntArray, offsets: IntArray, items: IntArray) -> None:
     """Counting sort of the cells by the hash of their keys: those of slot s are items[offsets[s]:offsets[s + 1]]."""
     slots = len(offsets) - 2
@@ -107,7 +107,7 @@ def _sort_cells(levels: IntArray, cells: IntArray, keys: IntArray, offsets: IntA
         offsets[s] += 1
 
 
-@njit(cache=True)
+@filling
 def _edge_candidates(
     a: Array,
     b: Array,
@@ -206,7 +206,7 @@ def _edge_candidates(
                 kind[e, m] = what
 
 
-@njit(cache=True)
+@inner
 def _square(points: Array, i: int, j: int) -> float:
     """Squared distance of points i and j."""
     x = points[i, 0] - points[j, 0]
@@ -215,7 +215,7 @@ def _square(points: Array, i: int, j: int) -> float:
     return x * x + y * y + z * z
 
 
-@njit(cache=True)
+@inner
 def _root(parent: IntArray, i: int) -> int:
     while parent[i] != i:
         parent[i] = parent[parent[i]]
@@ -223,7 +223,7 @@ def _root(parent: IntArray, i: int) -> int:
     return i
 
 
-@njit(cache=True)
+@inner
 def _may_join(
     p: int,
     q: int,
@@ -252,7 +252,7 @@ def _may_join(
     return True
 
 
-@njit(cache=True)
+@inner
 def _join(p: int, q: int, parent: IntArray, follow: IntArray, last: IntArray) -> None:
     low = p if p < q else q
     high = q if p < q else p
@@ -261,7 +261,7 @@ def _join(p: int, q: int, parent: IntArray, follow: IntArray, last: IntArray) ->
     last[low] = last[high]
 
 
-@njit(cache=True)
+@filling
 def _settle(parent: IntArray) -> None:
     """Make `parent` the root of each; a root is the lowest of its cluster."""
     for i in range(len(parent)):
@@ -296,7 +296,7 @@ def match_edges(
     return parent, mate
 
 
-@njit(cache=True)
+@filling
 def _match_edges(
     left: IntArray,
     right: IntArray,
@@ -360,7 +360,7 @@ def match_points(
     return parent
 
 
-@njit(cache=True)
+@filling
 def _match_points(
     left: IntArray,
     right: IntArray,
@@ -388,7 +388,7 @@ def contract(left: IntArray, right: IntArray, limit: float, points: Array) -> In
     return parent
 
 
-@njit(cache=True)
+@filling
 def _contract(
     left: IntArray, right: IntArray, limit: float, points: Array, parent: IntArray, follow: IntArray, last: IntArray
 ) -> None:

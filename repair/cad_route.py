@@ -1,4 +1,4 @@
-"""The ladder for CAD faces: keep them, sew round-off, or refuse with the places of what sewing cannot close.
+"""The ladder for CAD faces: keep them, sew round-off, cap planar openings when asked, or refuse with the places.
 
 Faces are never touched: a kept face has the surface it came with, checked to 1e-12. The sewing tolerance is found from
 the data, and a seam counts as closed only by the distance measured between its two surfaces.
@@ -6,12 +6,13 @@ the data, and a seam counts as closed only by the distance measured between its 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from patchwright.models.arrays import Array
 from patchwright.models.assembly import Assembly
+from patchwright.models.cad.capping import cap, free_loops, reason_against
 from patchwright.models.cad.seams import measure_seams
 from patchwright.models.cad.sewing import SewnResult, free_edge_curve, sew
 from patchwright.models.tolerance import Tolerance
@@ -31,11 +32,16 @@ LEFT = {"opening", "parametrisation", "component", "thin", "unit", "far-field", 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Outcome:
-    """The assembly after keeping and sewing, with the words for the ledger."""
+    """The assembly after keeping, sewing and capping, with the words for the ledger.
+
+    `caps` are the parts that close openings, `around` the faces along each.
+    """
 
     assembly: Assembly
     sewn: SewnResult | None
     reason: str
+    caps: tuple[int, ...] = ()
+    around: tuple[tuple[int, ...], ...] = ()
 
 
 def repair_cad(
@@ -43,7 +49,9 @@ def repair_cad(
 ) -> Repaired:
     """Keep the faces of a CAD model and sew them where only round-off separates them.
 
-    A model with gaps, crossing faces or invalid faces is refused; `scope="all"` resurfaces its tessellation instead.
+    A model with gaps, crossing faces or invalid faces is refused: no single face can be replaced yet without touching
+    its neighbours. `scope="all"` resurfaces the whole tessellation on the true surfaces instead, and the message says
+    so. `openings="close"` closes planar openings by trimmed planes on the openings' own edges.
     """
     progress("sewing", 0.2)
     outcome = _sewn(model)
@@ -52,14 +60,9 @@ def repair_cad(
         progress("checking the sewn shell", 0.6)
         after = diagnose(outcome.assembly, tolerance=tolerance)
     problems = tuple(_problem(d) for d in after.defects if d.severity == "error" and d.kind not in LEFT)
-    if openings == "close":
-        problems += tuple(
-            _problem(
-                d, "closing openings of CAD faces is not possible yet; --scope all closes them on the tessellation"
-            )
-            for d in after.defects
-            if d.kind == "opening"
-        )
+    if openings == "close" and not problems:
+        progress("capping openings", 0.7)
+        outcome, problems = _capped(outcome)
     ledger = _ledger(model, outcome, diagnosis, after)
     body, deviation = _triangulated(outcome.assembly, tolerance), None
     if problems:
@@ -75,12 +78,24 @@ def repair_cad(
                 "faces without a grid block", Rung.KEEP, without, "they are not four-sided", count=len(without)
             ),
         )
-    deviation = two_sided(model.triangulation, body, tolerance.fit)
+    caps = np.zeros(len(outcome.assembly.parts), dtype=bool)
+    caps[list(outcome.caps)] = True
+    areas = np.array([part.triangulation.areas.sum() for part in outcome.assembly.parts])
+    on_cap = None if body.tags is None else caps[body.tags]
+    deviation = two_sided(model.triangulation, body, tolerance.fit, skip_after=on_cap)
     verdict = Verdict.CLEAN if outcome.sewn is None else Verdict.REPAIRED
+    if outcome.caps:
+        verdict = Verdict.INVENTED
     rung = Rung.KEEP if outcome.sewn is None else Rung.WELD
+    around = dict(zip(outcome.caps, outcome.around, strict=True))
+    names = outcome.assembly.names
     faces = tuple(
-        Face(p.name, (p.name,), rung, 0.0, 0.0, float(p.triangulation.areas.sum())) for p in outcome.assembly.parts
+        Face(p.name, tuple(names[k] for k in around[i]), Rung.BRIDGE, float("nan"), 1.0, float(areas[i]))
+        if caps[i]
+        else Face(p.name, (p.name,), rung, 0.0, 0.0, float(areas[i]))
+        for i, p in enumerate(outcome.assembly.parts)
     )
+    invented = float(areas[caps].sum() / areas.sum()) if outcome.caps else 0.0
     return Repaired(
         verdict,
         faces,
@@ -88,7 +103,7 @@ def repair_cad(
         body,
         ledger,
         deviation,
-        0.0,
+        invented,
         (),
         outcome.assembly,
         grid=grid,
@@ -125,8 +140,31 @@ def _sewn(model: Assembly) -> _Outcome:
     )
 
 
-def _problem(defect: Defect, message: str = "") -> Problem:
-    return Problem(defect.kind, _point(defect.where), float(defect.size), message or defect.message)
+def _capped(outcome: _Outcome) -> tuple[_Outcome, tuple[Problem, ...]]:
+    """Every free loop closed by a plane, or the reasons why some cannot be."""
+    model = outcome.assembly
+    if model.topology is None:
+        return outcome, ()
+    flat, loops = SEAM_SHARE * model.diagonal, free_loops(model)
+    problems = []
+    for loop in loops:
+        if why := reason_against(loop, flat):
+            names = ", ".join(model.parts[face].name for face in loop.faces)
+            words = f"the opening along {names} cannot be capped: {why}; --scope all closes it on the tessellation"
+            problems.append(Problem("opening", _point(loop.centre), loop.diagonal, words))
+    if problems or not loops:
+        return outcome, tuple(problems)
+    made = cap(model, loops, flat)
+    change = float(made.surface_change.max(initial=0.0))
+    if change > UNCHANGED * max(model.diagonal, 1.0):
+        words = f"building the caps would change a kept face by {change:.3g}"
+        return outcome, (Problem("opening", _point(loops[0].centre), loops[0].diagonal, words),)
+    return replace(outcome, assembly=made.assembly, caps=made.caps, around=made.around), ()
+
+
+def _problem(defect: Defect) -> Problem:
+    words = f"{defect.message}; no rung of --scope least closes it, --scope all resurfaces the tessellation"
+    return Problem(defect.kind, _point(defect.where), float(defect.size), words)
 
 
 def _ledger(model: Assembly, outcome: _Outcome, before: Diagnosis, after: Diagnosis) -> tuple[LedgerEntry, ...]:
@@ -149,7 +187,21 @@ def _ledger(model: Assembly, outcome: _Outcome, before: Diagnosis, after: Diagno
         )
     else:
         entries.append(LedgerEntry("edges left as they were", Rung.KEEP, (), outcome.reason, count=0))
+    for at, around in zip(outcome.caps, outcome.around, strict=True):
+        part = outcome.assembly.parts[at]
+        entries.append(
+            LedgerEntry(
+                "opening capped by a plane",
+                Rung.BRIDGE,
+                tuple(outcome.assembly.parts[face].name for face in around),
+                f"{part.name} is trimmed by the opening's own edges; the faces around it are identical",
+                area=float(part.triangulation.areas.sum()),
+                where=_point(part.triangulation.bounds.mean(axis=0)),
+            )
+        )
     for defect in after.defects:
+        if outcome.caps and defect.kind == "opening":
+            continue
         if defect.kind in LEFT and defect.severity != "info":
             entries.append(
                 LedgerEntry(
@@ -191,7 +243,7 @@ def _figures(
         "grid blocks": blocks,
         "closed": free == 0,
         "free edges": free,
-        "openings kept": len(after.of("opening")),
+        "openings kept": 0 if free == 0 else len(after.of("opening")),
         "largest seam gap": max((s.gap for s in seams), default=0.0),
         "largest smooth seam angle": float(smooth.max()),
         "median smooth seam angle": float(np.median(smooth)),

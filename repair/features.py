@@ -1,7 +1,8 @@
 """Sharp edges, boundaries and corners of a triangulation, chained into curves that part it into smooth regions.
 
 An edge is sharp where the triangles' normals, freed from noise and needles, turn by more than the angle; lines that
-fade below it are followed down to `HYSTERESIS` of it as long as they go straight on. Specks are dropped.
+fade below it are followed down to `HYSTERESIS` of it as long as they go straight on. What no quad fits in is dropped:
+specks, teeth that a line runs out and back along, pieces of next to no area, hooks at loose ends.
 """
 
 from __future__ import annotations
@@ -19,8 +20,8 @@ HYSTERESIS = 0.6  # of the angle: how far a sharp line may fade
 CORNER_TURN = 40.0  # degrees a feature line turns at a corner
 SPECK_EDGES = 5  # a line of fewer edges and shorter than SPECK_SHARE is noise unless both its ends are attached
 SPECK_SHARE = 0.01  # of the diagonal
-SLIT = 1e-3  # of the diagonal: two lines between the same ends, nearer to each other, are one
-TEETH_ROUNDS = 4
+SLIT = 1e-3  # of the diagonal, a quarter of the smallest quad: lines between the same ends that are nearer are one
+ROUNDS = 4  # of cutting teeth and joining specks: what is left after that is no chain of slivers
 NOISY_HEIGHT = 20.0  # times the noise: a lower triangle's own normal is off by degrees
 NEEDLE_HEIGHT = 6.0  # times the noise: a lower triangle has no normal of its own
 FOLLOWED, SHARP, BOUNDARY = 1, 2, 3  # kinds of curves: only followed, sharp, boundary
@@ -117,8 +118,10 @@ def find_features(triangulation: Triangulation, *, angle: float = 30.0, frozen: 
         sharp &= _not_slits(edges, sharp | firm, firm, length, cosine, points, width)
         sharp &= _not_specks(edges, sharp | firm, firm, length, body.diagonal)
     _cut_teeth(body, neighbours, normals, edges, sides, sharp, firm, length, width)
+    if _merge_specks(body, neighbours, normals, sides, sharp, firm, length, width**2, np.cos(np.radians(angle))):
+        sharp &= _not_specks(edges, sharp | firm, firm, length, body.diagonal)
     kind = np.where(free, BOUNDARY, np.where(sharp, SHARP, np.where(follow, FOLLOWED, 0)))
-    return _chains(body, neighbours, normals, noise, edges, sides, kind, first, second)
+    return _chains(body, neighbours, normals, noise, edges, sides, kind, first, second, width)
 
 
 def _chains(
@@ -131,6 +134,7 @@ def _chains(
     kind: IntArray,
     first: IntArray,
     second: IntArray,
+    width: float,
 ) -> Features:
     """Curves through the feature edges (`kind` > 0), broken at branches, changes of kind and sharp turns."""
     from patchwright.repair import _feature_kernel as kernel
@@ -145,16 +149,27 @@ def _chains(
         np.minimum.at(low, ends[:, column], kind[picked])
         np.maximum.at(high, ends[:, column], kind[picked])
     stop = (degree > 0) & ((degree != 2) | (low != high))
-    starts, vertices, _, _ = kernel.trace(ends, offsets, incident, stop)
+    starts, vertices, walked, _ = kernel.trace(ends, offsets, incident, stop)
     turn = np.ones(len(vertices))
-    kernel.turning(points, starts, vertices, NOISY_HEIGHT * noise, turn)
-    # no corner in the last bit before a loose end: a curve of its own from there would be shorter than any quad
+    kernel.turning(points, starts, vertices, width, turn)
     owner, along = _arc_lengths(points, starts, vertices)
     rows = starts + np.arange(len(starts))
-    to_begin = np.where(degree[vertices[rows[:-1]]] == 1, 0.0, np.inf)[owner] + along
-    to_end = np.where(degree[vertices[rows[1:] - 1]] == 1, along[rows[1:] - 1], np.inf)[owner] - along
-    attached = np.minimum(to_begin, to_end) > 0.5 * SPECK_SHARE * body.diagonal
-    stop[vertices[(turn < np.cos(np.radians(CORNER_TURN))) & attached]] = True
+    length = along[rows[1:] - 1][owner]
+    begin, finish = vertices[rows[:-1]][owner], vertices[rows[1:] - 1][owner]
+    turns = turn < np.cos(np.radians(CORNER_TURN))
+    # a line that turns just before its loose end is cut there
+    hook = turns & (kind[picked[walked[starts[:-1]]]] == SHARP)[owner]
+    tail = 0.5 * SPECK_SHARE * body.diagonal
+    loose = _outside(
+        owner, hook & (degree[begin] == 1) & (along < tail), hook & (degree[finish] == 1) & (length - along < tail)
+    )
+    if len(loose):
+        kept = kind.copy()
+        kept[picked[walked[loose - owner[loose]]]] = 0
+        return _chains(body, neighbours, normals, noise, edges, sides, kept, first, second, width)
+    # no corner right beside another end
+    apart = (along > np.where(stop[begin], width, -1.0)) & (length - along > np.where(stop[finish], width, -1.0))
+    stop[vertices[turns & apart]] = True
     lo, hi = starts[:-1] + np.arange(len(starts) - 1), starts[1:] + np.arange(len(starts) - 1)
     for c in np.flatnonzero(vertices[lo] == vertices[hi]) if len(lo) else ():
         ring = vertices[lo[c] : hi[c]]
@@ -199,6 +214,16 @@ def _arc_lengths(points: Array, starts: IntArray, vertices: IntArray) -> tuple[I
     step[1:] = np.linalg.norm(np.diff(points[vertices], axis=0), axis=1)
     total = np.cumsum(step)
     return owner, total - total[rows[:-1]][owner] if len(vertices) else total
+
+
+def _outside(owner: IntArray, before: BoolArray, after: BoolArray) -> IntArray:
+    """Rows whose segment lies before the last marked row of its chain in `before`, or behind the first in `after`."""
+    count = int(owner.max()) + 1 if len(owner) else 0
+    last, first = np.full(count, -1), np.full(count, len(owner))
+    np.maximum.at(last, owner[before], np.flatnonzero(before))
+    np.minimum.at(first, owner[after], np.flatnonzero(after))
+    row = np.flatnonzero(owner[:-1] == owner[1:])
+    return row[(row < last[owner[row]]) | (row >= first[owner[row]])]
 
 
 def _split_touching(triangulation: Triangulation, frozen: IntArray | None) -> tuple[Triangulation, IntArray]:
@@ -352,11 +377,13 @@ def _cut_teeth(
     `sharp` and `normals` are changed in place. Only teeth narrower than `width` whose line turns back by less than
     `CORNER_TURN` are cut, and the triangle takes the normal of the surface it joins.
     """
-    for _ in range(TEETH_ROUNDS):
+    for _ in range(ROUNDS):
         feature = sharp | firm
         degree = np.bincount(edges[feature].reshape(-1), minlength=len(body.vertices))
         # side k is the one not sharp, k + 1 and k + 2 meet at corner k + 2
-        third = ~feature[sides] & (sharp & ~firm)[np.roll(sides, -1, axis=1)] & (sharp & ~firm)[np.roll(sides, -2, axis=1)]
+        third = (
+            ~feature[sides] & (sharp & ~firm)[np.roll(sides, -1, axis=1)] & (sharp & ~firm)[np.roll(sides, -2, axis=1)]
+        )
         t, k = np.nonzero(third & (length[sides] < width))
         apex = body.triangles[t, (k + 2) % 3]
         one = body.vertices[body.triangles[t, k]] - body.vertices[apex]
@@ -378,6 +405,60 @@ def _cut_teeth(
         joined = neighbours[t[:, None], (k[:, None] + np.array([1, 2])) % 3]
         largest = body.areas[joined].argmax(axis=1)
         normals[t] = normals[joined[np.arange(len(t)), largest]]
+
+
+def _merge_specks(
+    body: Triangulation,
+    neighbours: IntArray,
+    normals: Array,
+    sides: IntArray,
+    sharp: BoolArray,
+    firm: BoolArray,
+    length: Array,
+    least: float,
+    cosine: float,
+) -> bool:
+    """Join pieces of less area than `least` to the neighbour they share the longest border with.
+
+    Their triangles take that neighbour's normal; borders that are not sharp then, by `cosine`, are dropped as well.
+    `sharp` and `normals` are changed in place; whether anything was joined.
+    """
+    from patchwright.repair import _feature_kernel as kernel
+
+    joined = False
+    for _ in range(ROUNDS):
+        region = kernel.regions(neighbours, np.where((sharp | firm)[sides], 0, -1))
+        area = np.bincount(region, weights=body.areas)
+        small = (area < least)[region]
+        t, k = np.nonzero(small[:, None] & (neighbours >= 0) & (sharp & ~firm)[sides])
+        other = neighbours[t, k]
+        # a small piece goes to a larger one, so that two do not swap
+        grows = (area[region[other]] > area[region[t]]) | (
+            (area[region[other]] == area[region[t]]) & (region[other] > region[t])
+        )
+        t, k, other = t[grows], k[grows], other[grows]
+        if not len(t):
+            break
+        joined = True
+        count = len(area)
+        pairs, which = np.unique(region[t] * count + region[other], return_inverse=True)
+        border = np.bincount(which, weights=length[sides[t, k]])
+        order = np.lexsort((-border, pairs // count))
+        best = order[np.unique(pairs[order] // count, return_index=True)[1]]
+        # the border's mean normal on the larger side
+        chosen = np.isin(which, best)
+        total = np.zeros((count, 3))
+        np.add.at(total, region[t[chosen]], length[sides[t[chosen], k[chosen]]][:, None] * normals[other[chosen]])
+        size = np.linalg.norm(total, axis=1)
+        moved = np.flatnonzero((size > 0)[region] & small)
+        normals[moved] = total[region[moved]] / size[region[moved], None]
+        sharp[sides[t[chosen], k[chosen]]] = False
+        inside = np.zeros(len(body), dtype=bool)
+        inside[moved] = True
+        t, k = np.nonzero(inside[:, None] & (neighbours >= 0) & (sharp & ~firm)[sides])
+        blunt = np.einsum("ij,ij->i", normals[t], normals[neighbours[t, k]]) > cosine
+        sharp[sides[t[blunt], k[blunt]]] = False
+    return joined
 
 
 def _not_slits(

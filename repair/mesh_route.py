@@ -12,13 +12,15 @@ from typing import Literal
 
 import numpy as np
 
+from patchwright.models.adjacency import Adjacency
 from patchwright.models.arrays import Array, BoolArray
 from patchwright.models.assembly import Assembly, Part
 from patchwright.models.errors import GeometryError
 from patchwright.models.tolerance import Tolerance
 from patchwright.models.tree import Tree
 from patchwright.models.triangulation import Triangulation
-from patchwright.repair.deviation import Deviation, two_sided
+from patchwright.repair.cad_ground import ground_of, measured, on_model, true_entry
+from patchwright.repair.deviation import Deviation
 from patchwright.repair.faceting import faceting
 from patchwright.repair.last_resort import wrapped
 from patchwright.repair.mend import BRIDGED, CUT, KEPT, Mended, mend
@@ -28,6 +30,7 @@ from patchwright.repair.patch_fit import Target
 from patchwright.repair.quad_layout import QuadLayout, quad_layout
 from patchwright.repair.result import Face, LedgerEntry, Point, Problem, Progress, Repaired, Rung, Seam, Verdict
 from patchwright.repair.resurface import resurface
+from patchwright.repair.true_ground import TrueGround
 
 COVERAGE_GOAL = 0.99  # share of the area, both ways, within the fit tolerance; below it a result has not converged
 COVERAGE_LEAST = 0.95  # below it a result is refused
@@ -66,9 +69,12 @@ def repair_mesh(
     if mended.problems:
         problems = tuple(Problem(p.kind, _point(p.where), float(p.size), p.message) for p in mended.problems)
         return _refused(assembly, mended, ledger, problems)
-    tolerance, resolution = _resolved(tolerance, mended.triangulation)
+    ground = ground_of(assembly, mended)
+    resolution = 0.0
+    if not isinstance(ground, TrueGround):
+        tolerance, resolution = _resolved(tolerance, mended.triangulation)
     try:
-        network, deviation, tries = _fit(mended, tolerance, layout, progress)
+        network, deviation, tries = _fit(mended, ground, assembly, tolerance, layout, progress)
     except GeometryError as error:
         middle = _point(mended.triangulation.bounds.mean(axis=0))
         message = f"no layout of quads was found: {error}"
@@ -79,6 +85,8 @@ def repair_mesh(
     faces = _faces(network, mended)
     invented = float(mended.triangulation.areas[mended.origin == BRIDGED].sum() / mended.triangulation.areas.sum())
     ledger += (_fitting_entry(network, mended, tolerance, tries, resolution),)
+    if isinstance(ground, TrueGround):
+        ledger += (true_entry(ground, network, assembly),)
     if scope == "all":
         tessellation = network.tessellate(network.intervals_within(CHORD * tolerance.fit))
         tags = network.layout.tags[tessellation.tags] if tessellation.tags is not None else None
@@ -113,30 +121,29 @@ def repair_mesh(
 
 
 def _fit(
-    mended: Mended, tolerance: Tolerance, layout: str | QuadLayout, progress: Progress
+    mended: Mended,
+    ground: Tree | TrueGround,
+    assembly: Assembly,
+    tolerance: Tolerance,
+    layout: str | QuadLayout,
+    progress: Progress,
 ) -> tuple[PatchNetwork, Deviation, int]:
     """Lay out and fit, with finer quads until the coverage holds; the best network is kept."""
     body = mended.triangulation
     invented = np.asarray(mended.origin == BRIDGED)
-    tree = Tree.of(body)
-    target = Target(tree, invented)
+    target = Target(ground, invented, np.asarray(Adjacency.of(body).components()))
     best: tuple[PatchNetwork, Deviation] | None = None
     wanted: int | None = None
     for attempt in range(1 + RETRIES):
         progress("laying out quads", attempt / (1 + RETRIES))
         quads = quad_layout(body, target=wanted, angle=tolerance.angle) if isinstance(layout, str) else layout
+        if isinstance(layout, str):
+            quads = on_model(quads, ground, assembly, CHORD * tolerance.fit)
         network = resurface(quads, target, tolerance, noise=mended.noise, progress=progress)
         progress("measuring coverage", 0.0)
         intervals = network.intervals_within(CHORD * tolerance.fit)
         skip = network_invented(network, intervals)
-        deviation = two_sided(
-            body,
-            network.tessellate(intervals),
-            tolerance.fit,
-            skip_before=invented,
-            skip_after=skip,
-            before_tree=tree,
-        )
+        deviation = measured(ground, network.tessellate(intervals), tolerance.fit, invented, skip)
         if best is None or deviation.coverage > best[1].coverage:
             best = network, deviation
         if deviation.coverage >= COVERAGE_LEAST or not isinstance(layout, str):
@@ -257,7 +264,7 @@ def _fitting_entry(
     over = int((network.deviation > tolerance.fit).sum())
     reason = (
         f"bicubic patches over {len(network)} quads, layout {tries}; {over} stray farther than the fit tolerance; "
-        f"the input's facets are {resolution:.3g} high"
+        + (f"the input's facets are {resolution:.3g} high" if resolution else "fitted to the true surfaces")
     )
     return LedgerEntry(
         "patches fitted",

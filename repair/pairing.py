@@ -71,6 +71,28 @@ def pair_score(coarse: CoarseMesh) -> Array:
     return score
 
 
+def part_doublets(mesh: Any, score: Array, partner: IntArray) -> None:
+    """Take pairs apart, in place, until every inner vertex off the curves keeps three edges.
+
+    With two edges its two quads would share both and meet at angles that add up to a full turn: one of them folds.
+    """
+    triangles, neighbours = mesh.T, mesh.B
+    degree = np.bincount(triangles.reshape(-1), minlength=len(mesh.X))
+    while True:
+        t = np.flatnonzero((partner >= 0) & (neighbours[np.arange(len(partner)), partner] > np.arange(len(partner))))
+        k = partner[t]
+        ends = np.stack([triangles[t, k], triangles[t, (k + 1) % 3]], axis=1)
+        kept = degree - np.bincount(ends.reshape(-1), minlength=len(degree))
+        poor = (mesh.kind == 0) & (kept < 3) & (degree >= 3)
+        which = np.flatnonzero(poor[ends].any(axis=1))
+        if not len(which):
+            return
+        # the worst pair first; the next round sees what it left
+        worst = which[np.argmin(score[t[which], k[which]])]
+        partner[neighbours[t[worst], k[worst]]] = -1
+        partner[t[worst]] = -1
+
+
 def pair(coarse: CoarseMesh) -> QuadMesh:
     """Quads only, on the surface and along the features."""
     from patchwright.repair import _quad_kernel as kernel
@@ -81,6 +103,7 @@ def pair(coarse: CoarseMesh) -> QuadMesh:
     m, n = len(triangles), len(mesh.X)
     score = pair_score(coarse)
     partner = kernel.match(neighbours, score, np.argsort(-score.reshape(-1), kind="stable"))
+    part_doublets(mesh, score, partner)
     arcs = np.zeros((m, 3, 2))
     kernel.curve_sides_of_edges(mesh, ground, m, arcs)
     # faces: pairs as (a, d, b, c), triangles with -1 at the end

@@ -10,13 +10,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from patchwright.models.arrays import Array, BoolArray
-from patchwright.models.tree import Tree
+from patchwright.models.arrays import Array, BoolArray, IntArray
 from patchwright.repair.coons import coons_grid, offset_distance, offset_normals
 from patchwright.repair.filling import FillStatus, fill
 from patchwright.repair.patch_nets import evaluate
-from patchwright.repair.projection import project
+from patchwright.repair.projection import Ground, project
 from patchwright.repair.spline_space import interior_fit, uniform_collocation
+from patchwright.repair.true_surface import Outcome
 
 SAMPLES_PER_CELL = 4
 FEWEST_SAMPLES = 8
@@ -31,12 +31,16 @@ def samples_for(cells: int) -> int:
 class Target:
     """The surface patches are projected onto.
 
-    `tree` spans the mended triangulation; `invented` (t,) says which of its triangles gap filling made: they bound the
-    body but carry no data, so a hit on one is a miss.
+    `tree` spans the mended triangulation, as a `TrueGround` where the true surfaces behind it are known; `invented`
+    (t,) says which of its triangles gap filling made: they bound the body but carry no data, so a hit on one is a miss.
+    `region` (t,) labels the triangles: a patch only takes hits of the label its border lies on; None takes any. The
+    label to give is the connected piece: sheets that face the same way behind one another are then told apart, which
+    neither facing nor thickness does.
     """
 
-    tree: Tree
+    tree: Ground
     invented: BoolArray
+    region: IntArray | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,13 +48,15 @@ class FittedGroup:
     """Patches of one size.
 
     `nets` (k, M + 3, N + 3, 3); `grid` (k, m + 1, n + 1, 3) the points they approximate; `data` (k, m + 1, n + 1)
-    where those came from the input and not from gap filling; `status` one per patch.
+    where those came from the input and not from gap filling; `status` one per patch; `outcomes` (5,) how many of the
+    inner points that hit data ended in each `Outcome` (without true surfaces all are NO_SURFACE).
     """
 
     nets: Array
     grid: Array
     data: BoolArray
     status: tuple[FillStatus, ...]
+    outcomes: IntArray
 
 
 def fit_group(
@@ -71,16 +77,21 @@ def fit_group(
     distance = np.broadcast_to(offset_distance(coons)[:, None, None], coons.shape[:3])
     inner = np.zeros(coons.shape[:3], dtype=bool)
     inner[:, 1:-1, 1:-1] = True
-    hits = project(coons[inner], normal[inner], distance[inner], target.tree)
+    given = np.asarray(~inner)
+    border = target.tree.closest(coons[given]).triangle
+    on_data = ~target.invented[border]
+    allowed = None
+    if target.region is not None:
+        patch = np.broadcast_to(np.arange(k)[:, None, None], inner.shape)
+        allowed = _most_frequent(patch[given], target.region[border], k)[patch[inner]]
+    hits = project(coons[inner], normal[inner], distance[inner], target.tree, region=target.region, allowed=allowed)
     known = hits.hit & ~target.invented[hits.triangle]
     offset = np.zeros(coons.shape[:3])
-    given = np.ones(coons.shape[:3], dtype=np.bool_)
-    given[:, 1:-1, 1:-1] = False
     found = given.copy()  # the boundary curves are given, wherever they run
     found[inner] = known
     offset[inner] = (1.0 - 2.0 * hits.t) * distance[inner]  # signed height of p above the Coons patch
     data = found.copy()
-    data[given] = ~target.invented[target.tree.closest(coons[given]).triangle]
+    data[given] = on_data
     # no data under the whole patch: its guide is the bridging surface itself
     bare = np.asarray(~found[:, 1:-1, 1:-1].any(axis=(1, 2)))
     guided = inner & bare[:, None, None]
@@ -94,7 +105,18 @@ def fit_group(
         status.append(one)
     offset[bare[:, None, None] & ~guided] = 0.0
     grid = coons + offset[..., None] * normal  # HJR 10 and 13
-    return FittedGroup(_least_squares(rows, grid, cells), grid, data, tuple(status))
+    outcomes = np.bincount(hits.outcome[known], minlength=len(Outcome))
+    return FittedGroup(_least_squares(rows, grid, cells), grid, data, tuple(status), outcomes)
+
+
+def _most_frequent(group: IntArray, label: IntArray, count: int) -> IntArray:
+    """(count,) the label most often met in each group, the lowest of equals, -1 for an empty group."""
+    width = int(label.max(initial=0)) + 1
+    keys, times = np.unique(group * width + label, return_counts=True)
+    order = np.lexsort((-keys, times))  # the last one written wins: most often met, lowest label
+    out = np.full(count, -1, dtype=np.int64)
+    out[keys[order] // width] = keys[order] % width
+    return out
 
 
 def _least_squares(rows: tuple[Array, Array, Array, Array], grid: Array, cells: tuple[int, int]) -> Array:

@@ -1,23 +1,45 @@
 """Projection of patch points onto the dirty triangulation along both patch normals, with the thin-skin rule.
 
 Source: Hamann, Jean, Razdan, section 3 (HJR 5-10). Departure: nearest is not enough on thin bodies, so a hit counts
-only if its triangle faces the same way as the patch and lies nearer than 0.4 of the local thickness.
+only if its triangle faces the same way as the patch and lies nearer than 0.4 of the local thickness. On a `TrueGround`
+the hit then goes to the parametric surface its triangle came from.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
+import numpy.typing as npt
 
 from patchwright.models.arrays import Array, BoolArray, IntArray
+from patchwright.repair.true_ground import TrueGround
+from patchwright.repair.true_surface import Outcome
 
 if TYPE_CHECKING:
-    from patchwright.models.tree import Tree
+    from patchwright.models.tree import ClosestPoints, SegmentHits
+    from patchwright.models.triangulation import Triangulation
 
 FACING = 0.2  # cosine: a triangle turned further from the patch normal belongs to another skin or to a step
 SKIN_SHARE = 0.4  # of the local thickness: hits farther from the patch may be the other skin
+
+
+class Ground(Protocol):
+    """What patches are projected onto: a `Tree`, or a `TrueGround` that knows the surfaces behind its triangles."""
+
+    @property
+    def triangulation(self) -> Triangulation:
+        """The triangles, consistently oriented."""
+        ...
+
+    def closest(self, points: npt.ArrayLike) -> ClosestPoints:
+        """The closest point of the ground to each of `points` (n, 3)."""
+        ...
+
+    def all_hits(self, start: npt.ArrayLike, end: npt.ArrayLike) -> SegmentHits:
+        """Every triangle each segment crosses."""
+        ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -25,13 +47,15 @@ class Projected:
     """What became of each patch point.
 
     `points` (n, 3) are on the triangulation where `triangle` >= 0 and the patch's own points elsewhere; `t` (n,) is
-    the place on the offset segment a-b, p = (1 - t) a + t b (HJR 10), 0.5 for a miss; `barycentric` (n, 3).
+    the place on the offset segment a-b, p = (1 - t) a + t b (HJR 10), 0.5 for a miss; `barycentric` (n, 3) in the
+    triangle that was hit; `outcome` (n,) says which points lie on the true surface behind it (see `Outcome`).
     """
 
     points: Array
     t: Array
     triangle: IntArray
     barycentric: Array
+    outcome: IntArray
 
     @property
     def hit(self) -> BoolArray:
@@ -43,7 +67,7 @@ def project(
     points: Array,
     normals: Array,
     distance: Array,
-    tree: Tree,
+    tree: Ground,
     *,
     region: IntArray | None = None,
     allowed: IntArray | None = None,
@@ -54,7 +78,7 @@ def project(
     ----------
     points, normals : (n, 3), unit normals facing outward
     distance : (n,) half the length of each segment (HJR 6)
-    tree : over a consistently oriented triangulation
+    tree : over a consistently oriented triangulation; a `TrueGround` has its hits moved on to the true surfaces
     region, allowed : (m,) label of each triangle and (n,) the label each point may land on; None: any
 
     Returns
@@ -72,12 +96,17 @@ def project(
     triangle = np.full(len(points), -1, dtype=np.int64)
     barycentric = np.zeros((len(points), 3))
     out = points.copy()
+    outcome = np.full(len(points), int(Outcome.NO_SURFACE))
     if found.any():
         t[found] = hits.t[pick[found]]
         triangle[found] = hits.triangle[pick[found]]
         barycentric[found] = hits.barycentric[pick[found]]
         out[found] = (1.0 - t[found, None]) * a[found] + t[found, None] * b[found]  # HJR 10
-    return Projected(out, t, triangle, barycentric)
+    if found.any() and isinstance(tree, TrueGround):
+        out[found], t[found], outcome[found] = tree.on_segments(
+            triangle[found], out[found], t[found], a[found], b[found]
+        )  # HJR 8-9
+    return Projected(out, t, triangle, barycentric, outcome)
 
 
 def _choose(

@@ -9,7 +9,7 @@ from __future__ import annotations
 from OCP.BinTools import BinTools, BinTools_FormatVersion
 from OCP.BRep import BRep_Builder, BRep_Tool
 from OCP.BRepAdaptor import BRepAdaptor_Curve
-from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeFace, BRepBuilderAPI_Sewing
+from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeEdge, BRepBuilderAPI_MakeFace, BRepBuilderAPI_Sewing
 from OCP.BRepCheck import BRepCheck_Analyzer
 from OCP.BRepLib import BRepLib
 from OCP.BRepMesh import BRepMesh_IncrementalMesh
@@ -100,6 +100,7 @@ __all__ = [
     "Array2_double",
     "Array2_gp_Pnt",
     "BRepAdaptor_Curve",
+    "BRepBuilderAPI_MakeEdge",
     "BRepBuilderAPI_MakeFace",
     "BRepBuilderAPI_Sewing",
     "BRepCheck_Analyzer",

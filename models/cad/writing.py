@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -42,12 +43,32 @@ def write_file(
     EngineError : the kernel refuses a face or cannot write.
     """
     shape, faces = shape_of(assembly, deviation, volumes)
+    label = label_step if kind == "STEP" else label_iges
+    product = Path(assembly.source).stem
+    write_shape(path, kind, shape, own_unit, file_unit, product, lambda writer: label(writer, shape, faces, assembly))
+
+
+def write_shape(
+    path: Path,
+    kind: str,
+    shape: Any,
+    own_unit: str,
+    file_unit: str,
+    product: str = "",
+    label: Callable[[Any], None] = lambda writer: None,
+) -> None:
+    """A kernel shape as STEP or IGES; `label` names what the writer has made of it.
+
+    Raises
+    ------
+    EngineError : the kernel cannot write it.
+    """
     kernel.Interface_Static.SetCVal_s("xstep.cascade.unit", _UNITS[own_unit])
     try:
         if kind == "STEP":
-            _write_step(path, shape, faces, assembly, file_unit)
+            _write_step(path, shape, file_unit, product or "patchwright", label)
         else:
-            _write_iges(path, shape, faces, assembly, file_unit)
+            _write_iges(path, shape, file_unit, label)
     finally:
         kernel.Interface_Static.SetCVal_s("xstep.cascade.unit", "MM")
 
@@ -75,7 +96,7 @@ def shape_of(assembly: Assembly, deviation: Array, volumes: dict[int, float] | N
         closed = [is_closed(assembly.topology, g) for g in groups]
         known = volumes or {}
         bodies = [_body([faces[i] for i in g], c, known.get(g[0])) for g, c in zip(groups, closed, strict=True)]
-        return _compound(bodies), faces
+        return compound(bodies), faces
     kept = [i for i, p in enumerate(parts) if isinstance(p.native, NativeFace)]
     made: dict[int, Any] = {i: decode_face(parts[i].native) for i in kept}
     for i, part in enumerate(parts):
@@ -83,7 +104,7 @@ def shape_of(assembly: Assembly, deviation: Array, volumes: dict[int, float] | N
             made[i] = natural_face(part.surface, *surface_to_kernel(part.surface))
     loose = [made[i] for i in range(len(parts)) if i not in set(kept)]
     bodies = [_kept_bodies(assembly, kept)] if kept else []
-    return _compound([*bodies, *loose]), [made[i] for i in range(len(parts))]
+    return compound([*bodies, *loose]), [made[i] for i in range(len(parts))]
 
 
 def _native_surface(native: NativeFace) -> tuple[Any, float]:
@@ -122,7 +143,7 @@ def _kept_bodies(assembly: Assembly, kept: list[int]) -> Any:
         for i in range(1, wanted[key].Size() + 1):
             if not placed.Contains(wanted[key].FindKey(i)):
                 out.append(wanted[key].FindKey(i))
-    return _compound(out)
+    return compound(out)
 
 
 def _body(faces: list[Any], closed: bool, volume: float | None) -> Any:
@@ -145,7 +166,8 @@ def _body(faces: list[Any], closed: bool, volume: float | None) -> Any:
     return solid
 
 
-def _compound(shapes: list[Any]) -> Any:
+def compound(shapes: list[Any]) -> Any:
+    """One shape as it is, several as a compound."""
     if len(shapes) == 1:
         return shapes[0]
     builder, out = kernel.BRep_Builder(), kernel.TopoDS_Compound()
@@ -155,26 +177,26 @@ def _compound(shapes: list[Any]) -> Any:
     return out
 
 
-def _write_step(path: Path, shape: Any, faces: list[Any], assembly: Assembly, unit: str) -> None:
+def _write_step(path: Path, shape: Any, unit: str, product: str, label: Callable[[Any], None]) -> None:
     static = kernel.Interface_Static
     static.SetCVal_s("write.step.unit", _UNITS[unit])
-    static.SetCVal_s("write.step.product.name", Path(assembly.source).stem or "patchwright")
+    static.SetCVal_s("write.step.product.name", product)
     writer = kernel.STEPControl_Writer()
     if writer.Transfer(shape, kernel.STEPControl_StepModelType.STEPControl_AsIs) != kernel.DONE:
-        raise EngineError(f"the CAD kernel cannot turn {len(faces)} faces into STEP")
-    label_step(writer, shape, faces, assembly)
+        raise EngineError(f"the CAD kernel cannot turn {product} into STEP")
+    label(writer)
     text = kernel.StepData_StepWriter(writer.Model())
     _all_digits(text.FloatWriter())
     text.SendModel(kernel.StepAP214.Protocol_s())
     _print(text, path)
 
 
-def _write_iges(path: Path, shape: Any, faces: list[Any], assembly: Assembly, unit: str) -> None:
+def _write_iges(path: Path, shape: Any, unit: str, label: Callable[[Any], None]) -> None:
     kernel.Interface_Static.SetCVal_s("write.iges.unit", _UNITS[unit])
     writer = kernel.IGESControl_Writer(_UNITS[unit], 1)  # 1: boundary model (type 186), faces share edges
     if not writer.AddShape(shape):
-        raise EngineError(f"the CAD kernel cannot turn {len(faces)} faces into IGES")
-    label_iges(writer, shape, faces, assembly)
+        raise EngineError(f"the CAD kernel cannot turn the model into IGES for {path.name}")
+    label(writer)
     writer.ComputeModel()
     text = kernel.IGESData_IGESWriter(writer.Model())
     _all_digits(text.FloatWriter())

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from layout_shapes import cube, cylinder, jittered, moved, plate_with_hole, sphere, wedge
 
 from patchwright.models import GeometryError, Triangulation
-from patchwright.repair.features import BOUNDARY, FOLLOWED, SHARP, find_features
+from patchwright.models.adjacency import Adjacency
+from patchwright.repair.features import BOUNDARY, FOLLOWED, SHARP, _cut_teeth, find_features
 
 
 @pytest.mark.parametrize("intervals", [1, 5])
@@ -111,3 +114,69 @@ def test_what_is_not_a_manifold_is_refused():
         find_features(Triangulation(shape.vertices, turned))
     with pytest.raises(GeometryError, match="at least one"):
         find_features(Triangulation(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64)))
+
+
+def flap(width):
+    """A unit square whose side x < 0 goes on for `width`, folded down by a right angle; both are open."""
+    x, y = np.array([0.0, 0.5, 1.0]), np.array([0.0, 0.25, 0.5, 0.75, 1.0])
+    flat = np.stack([*np.meshgrid(x, y, indexing="ij"), np.zeros((3, 5))], axis=-1)
+    edge = np.stack([np.zeros(5), y, np.full(5, -width)], axis=-1)
+    points = np.concatenate([edge[None], flat])
+    number = np.arange(points.shape[0] * 5).reshape(-1, 5)
+    a, b, c, d = number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]
+    triangles = np.stack([np.stack([a, b, c], -1), np.stack([a, c, d], -1)]).reshape(-1, 3)
+    return Triangulation(points.reshape(-1, 3), triangles)
+
+
+@pytest.mark.parametrize("scale", [1e-3, 1.0, 1e3])
+def test_no_corner_right_beside_a_branch(scale):
+    # the fold's ends are branches of the boundary; the flap's own corners count only where a quad fits between
+    wide, narrow = find_features(moved(flap(0.2), scale)[0]), find_features(moved(flap(5e-4), scale)[0])
+    assert sorted(wide.lengths / scale) == pytest.approx([0.2, 0.2, 1, 1, 1, 1, 1], rel=1e-9)
+    assert sorted(narrow.lengths / scale) == pytest.approx([1, 1, 1, 1, 1.001], rel=1e-9)
+    assert (wide.kind == SHARP).sum() == (narrow.kind == SHARP).sum() == 1
+
+
+@pytest.mark.parametrize(("size", "kept"), [(2e-4, 4), (0.05, 10)])
+def test_a_spike_smaller_than_any_quad_is_no_feature(size, kept):
+    # a three-sided pyramid on a plate: six sharp edges, none of them loose
+    square = [[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]
+    turn = 2 * np.pi * np.arange(3) / 3
+    foot = np.stack([size * np.cos(turn), size * np.sin(turn), np.zeros(3)], axis=1)
+    points = np.concatenate([square, foot, [[0, 0, size]]])
+    corners = [
+        [0, 1, 6],
+        [1, 4, 6],
+        [1, 2, 4],
+        [2, 5, 4],
+        [2, 3, 5],
+        [3, 6, 5],
+        [3, 0, 6],
+        [4, 5, 7],
+        [5, 6, 7],
+        [6, 4, 7],
+    ]
+    features = find_features(Triangulation(points.astype(float), np.array(corners)))
+    assert len(features.kind) == kept
+    assert (features.kind == BOUNDARY).sum() == 4
+
+
+def test_a_tooth_is_cut_off():
+    # a line along y = 0 that runs back to the apex (1, 0.1) and out again, on a fan of triangles
+    points = np.array([[0, 0, 0], [1.9, 0, 0], [2, 0, 0], [4, 0, 0], [1, 0.1, 0], [2, 2, 0], [2, -2, 0]], dtype=float)
+    triangles = np.array([[0, 1, 4], [1, 2, 4], [0, 4, 5], [4, 2, 5], [2, 3, 5], [0, 6, 1], [1, 6, 2], [2, 6, 3]])
+    body = Triangulation(points, triangles)
+    adjacency = Adjacency.of(body)
+    edges, sides = np.asarray(adjacency.edges), np.asarray(adjacency.triangle_edges)
+    length = np.linalg.norm(points[edges[:, 1]] - points[edges[:, 0]], axis=1)
+
+    def line(*vertices):
+        pairs = {tuple(sorted(pair)) for pair in pairwise(vertices)}
+        return np.array([tuple(edge) in pairs for edge in edges.tolist()])
+
+    none = np.zeros(len(edges), dtype=bool)
+    neighbours = np.asarray(adjacency.neighbours)
+    for width, firm, straight in ((0.2, none, True), (0.05, none, False), (0.2, line(1, 4), False)):
+        normals, sharp = np.array(body.normals), line(0, 1, 4, 2, 3)
+        _cut_teeth(body, neighbours, normals, edges, sides, sharp, firm, length, width)
+        np.testing.assert_array_equal(sharp, line(0, 1, 2, 3) if straight else line(0, 1, 4, 2, 3))

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from layout_shapes import cube, plate_with_hole, sphere, torus
 
 from patchwright.repair._quad_kernel import match
 from patchwright.repair.features import find_features
-from patchwright.repair.pairing import pair, pair_score
+from patchwright.repair.pairing import pair, pair_score, part_doublets
 from patchwright.repair.quad_smooth import scaled_jacobians, smooth
 from patchwright.repair.remesh import remesh
 
@@ -66,3 +68,23 @@ def test_smoothing_betters_the_worst_quad():
     after = scaled_jacobians(mesh)
     assert after.min() >= min(before.min(), 0.55)
     assert np.median(after) > np.median(before)
+
+
+@pytest.mark.parametrize(("kind", "kept"), [(0, False), (1, True)])
+def test_no_inner_vertex_keeps_two_edges(kind, kept):
+    # a triangle split at vertex 0: joining two of the three leaves 0 between two quads that share both its edges
+    mesh = SimpleNamespace(
+        T=np.array([[0, 1, 2], [0, 2, 3], [0, 3, 1]]),
+        B=np.array([[2, -1, 1], [0, -1, 2], [1, -1, 0]]),
+        X=np.zeros((4, 3)),
+        kind=np.array([kind, 2, 2, 2]),
+    )
+    partner = np.array([2, 0, -1])
+    part_doublets(mesh, np.ones((3, 3)), partner)
+    np.testing.assert_array_equal(partner, [2, 0, -1] if kept else [-1, -1, -1])
+
+
+def test_layouts_have_no_doublets():
+    for shape, size in ((sphere(), 0.3), (sphere(), 0.7), (torus(), 0.35)):
+        quads = pair(coarse_of(shape, size)).quads
+        assert np.bincount(quads.reshape(-1)).min() >= 3

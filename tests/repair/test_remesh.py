@@ -100,3 +100,16 @@ def test_the_number_follows_the_length():
     count = [len(remesh(features, np.full(n, h)).triangles) for h in (0.4, 0.2, 0.1)]
     for coarse, fine in pairwise(count):
         assert 3.0 < fine / coarse < 5.2
+
+
+@pytest.mark.parametrize("sections", [96, 768, 3072])
+def test_long_needles_are_cleared_away(sections):
+    # triangles as long as the cylinder and down to 250 times narrower, wanted lengths between
+    shape = cylinder(sections, 1)
+    features = find_features(shape)
+    coarse = remesh(features, np.full(len(features.body.vertices), 0.25))
+    corners = coarse.vertices[coarse.triangles]
+    sides = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
+    area = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    assert (4 * np.sqrt(3) * area / (sides**2).sum(axis=1)).min() > 0.3
+    assert sides.max() < 2 * 0.25

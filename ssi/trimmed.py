@@ -1,0 +1,180 @@
+"""Curves of two surfaces cut back to the faces' trims.
+
+A curve ends where its (u, v) image crosses a trim loop: crossings of the polylines seed Newton's method on both curves.
+Pieces are kept when their middle lies inside the loops (even-odd rule) or on them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from patchwright.models.arrays import Array, BoolArray
+from patchwright.models.nurbs_curve import NurbsCurve
+from patchwright.models.surface import Surface
+from patchwright.ssi.intersection import Contact, Intersection, IntersectionCurve
+from patchwright.ssi.operands import Loops
+
+PER_SPAN = 24  # chords of a polyline in each knot span
+NEWTON = 12
+
+
+def trimmed(found: Intersection, surface: Surface, loops: Loops | None, side: int) -> Intersection:
+    """What of an intersection lies on a face.
+
+    Parameters
+    ----------
+    surface, loops : the face; None as loops keeps everything
+    side : 0 when the face is the first of the two surfaces, 1 when it is the second
+    """
+    if loops is None:
+        return found
+    border = [_moved(curve, shift) for loop in loops for curve in loop for shift in _shifts(surface)]
+    polygons = [np.concatenate([_polyline(c)[0][:-1] for c in loop]) for loop in loops]
+    curves = tuple(piece for curve in found.curves for piece in _cut(curve, surface, border, polygons, side))
+    points = tuple(p for p in found.points if _keeps(p, surface, polygons, side))
+    return replace(found, curves=curves, points=points)
+
+
+def _keeps(contact: Contact, surface: Surface, polygons: Sequence[Array], side: int) -> bool:
+    uv = contact.uv_a if side == 0 else contact.uv_b
+    return uv is None or bool(_inside(np.array([uv]), surface, polygons)[0])
+
+
+def _cut(
+    curve: IntersectionCurve, surface: Surface, border: Sequence[NurbsCurve], polygons: Sequence[Array], side: int
+) -> list[IntersectionCurve]:
+    """The pieces of one curve inside the loops."""
+    uv = curve.uv_a if side == 0 else curve.uv_b
+    if uv is None:
+        return [curve]
+    start, end = curve.curve.domain
+    least = 1e-9 * (end - start)
+    cuts = np.unique(np.concatenate([_crossings(uv, other) for other in border] or [np.zeros(0)]))
+    cuts = cuts[(cuts > start + least) & (cuts < end - least)]
+    cuts = cuts[np.diff(cuts, prepend=start) > least]
+    ends = np.concatenate([[start], cuts, [end]])
+    kept = _inside(uv(0.5 * (ends[1:] + ends[:-1])), surface, polygons)
+    if kept.all():
+        return [curve]
+    runs = [(ends[i], ends[i + 1]) for i in np.flatnonzero(kept)]
+    pieces = [_restricted(curve, t0, t1) for t0, t1 in runs]
+    if curve.closed and len(pieces) > 1 and kept[0] and kept[-1]:
+        pieces = [_joined(pieces[-1], pieces[0]), *pieces[1:-1]]
+    return pieces
+
+
+def _restricted(curve: IntersectionCurve, t0: float, t1: float) -> IntersectionCurve:
+    part = curve.curve.restricted(t0, t1)
+    uv_a, uv_b = (None if c is None else c.restricted(t0, t1) for c in (curve.uv_a, curve.uv_b))
+    at = curve.curve.closest(curve.points).parameters if len(curve.points) else np.zeros(0)
+    inner = curve.points[(at > t0) & (at < t1)]
+    points = np.concatenate([curve.curve(np.array([t0])), inner, curve.curve(np.array([t1]))])
+    return replace(curve, curve=part, uv_a=uv_a, uv_b=uv_b, points=points, closed=False)
+
+
+def _joined(first: IntersectionCurve, second: IntersectionCurve) -> IntersectionCurve:
+    """Two pieces of a loop that were parted only where the loop happens to begin."""
+
+    def both(a: NurbsCurve | None, b: NurbsCurve | None) -> NurbsCurve | None:
+        return None if a is None or b is None else _appended(a, b)
+
+    points = np.concatenate([first.points, second.points[1:]])
+    return replace(
+        first,
+        curve=_appended(first.curve, second.curve),
+        uv_a=both(first.uv_a, second.uv_a),
+        uv_b=both(first.uv_b, second.uv_b),
+        points=points,
+    )
+
+
+def _appended(a: NurbsCurve, b: NurbsCurve) -> NurbsCurve:
+    """One curve through a and on through b, both of one degree; across a parameter seam it jumps."""
+    a, b = a.clamped(), b.clamped()
+    p = a.degree
+    shift = a.domain[1] - b.domain[0]
+    wa = np.ones(len(a.control_points)) if a.weights is None else a.weights
+    wb = np.ones(len(b.control_points)) if b.weights is None else b.weights
+    wb = wb * (wa[-1] / wb[0])
+    meets = np.allclose(a.control_points[-1], b.control_points[0], rtol=1e-9, atol=1e-12)
+    skip = 1 if meets else 0
+    knots = np.concatenate([a.knots[: -1 if meets else None], b.knots[p + 1 :] + shift])
+    points = np.concatenate([a.control_points, b.control_points[skip:]])
+    rational = a.weights is not None or b.weights is not None
+    return NurbsCurve(p, knots, points, np.concatenate([wa, wb[skip:]]) if rational else None)
+
+
+def _polyline(curve: NurbsCurve) -> tuple[Array, Array]:
+    """Points of a curve, knots included, and their parameters."""
+    breaks = curve.breaks
+    share = np.arange(PER_SPAN) / PER_SPAN
+    t = np.append((breaks[:-1, None] + share * np.diff(breaks)[:, None]).reshape(-1), breaks[-1])
+    return curve(t), t
+
+
+def _crossings(one: NurbsCurve, other: NurbsCurve) -> Array:
+    """Parameters of the plane curve `one` at which it crosses `other`."""
+    (p, t), (q, s) = _polyline(one), _polyline(other)
+    d, e = np.diff(p, axis=0), np.diff(q, axis=0)
+    gap = q[None, :-1] - p[:-1, None]
+    cross = d[:, None, 0] * e[None, :, 1] - d[:, None, 1] * e[None, :, 0]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        x = (gap[..., 0] * e[None, :, 1] - gap[..., 1] * e[None, :, 0]) / cross
+        y = (gap[..., 0] * d[:, None, 1] - gap[..., 1] * d[:, None, 0]) / cross
+    slack = 0.05  # a chord's crossing may lie a little beyond the curve's own stretch
+    i, j = np.nonzero((x > -slack) & (x < 1 + slack) & (y > -slack) & (y < 1 + slack))
+    if not len(i):
+        return np.zeros(0)
+    at, on = t[i] + x[i, j] * np.diff(t)[i], s[j] + y[i, j] * np.diff(s)[j]
+    at, on = np.clip(at, *one.domain), np.clip(on, *other.domain)
+    for _ in range(NEWTON):
+        away = one(at) - other(on)
+        a, b = one(at, nu=1), other(on, nu=1)
+        area = a[:, 1] * b[:, 0] - a[:, 0] * b[:, 1]
+        area = np.where(area == 0.0, np.inf, area)
+        at = np.clip(at + (away[:, 0] * b[:, 1] - away[:, 1] * b[:, 0]) / area, *one.domain)
+        on = np.clip(on + (away[:, 0] * a[:, 1] - away[:, 1] * a[:, 0]) / area, *other.domain)
+    miss = np.linalg.norm(one(at) - other(on), axis=1)
+    size = float(np.ptp(q, axis=0).max() + np.ptp(p, axis=0).max())
+    good = np.sort(at[miss < 1e-10 * size])
+    apart = np.diff(good, prepend=-np.inf) > 1e-9 * (one.domain[1] - one.domain[0])
+    return np.asarray(good[apart])
+
+
+def _inside(uv: Array, surface: Surface, polygons: Sequence[Array]) -> BoolArray:
+    """(n,) whether points lie inside the loops, in any of their periods."""
+    out = np.zeros(len(uv), dtype=bool)
+    for shift in _shifts(surface):
+        crossings = np.zeros(len(uv), dtype=np.int64)
+        for polygon in polygons:
+            a = polygon + shift
+            b = np.roll(a, -1, axis=0)
+            spans = (a[None, :, 1] > uv[:, 1:]) != (b[None, :, 1] > uv[:, 1:])
+            with np.errstate(divide="ignore", invalid="ignore"):
+                x = a[:, 0] + (uv[:, 1:] - a[:, 1]) / (b[:, 1] - a[:, 1]) * (b[:, 0] - a[:, 0])
+            crossings += (spans & (x > uv[:, :1])).sum(axis=1)
+        out |= crossings % 2 == 1
+    return out
+
+
+def _shifts(surface: Surface) -> list[Array]:
+    """Whole periods by which (u, v) may run beyond the domain, none first."""
+    (u0, u1), (v0, v1) = surface.domain
+    out = [np.zeros(2)]
+    if not np.isfinite([u0, u1, v0, v1]).all():
+        return out
+    t = np.linspace(0.0, 1.0, 7)[1:-1]
+    u, v = u0 + t * (u1 - u0), v0 + t * (v1 - v0)
+    size = float(np.ptp(surface(u, v), axis=0).max())
+    if np.abs(surface(np.full(5, u0), v) - surface(np.full(5, u1), v)).max() < 1e-9 * size:
+        out += [np.array([k * (u1 - u0), 0.0]) for k in (-1.0, 1.0)]
+    if np.abs(surface(u, np.full(5, v0)) - surface(u, np.full(5, v1))).max() < 1e-9 * size:
+        out += [shift + np.array([0.0, k * (v1 - v0)]) for shift in list(out) for k in (-1.0, 1.0)]
+    return out
+
+
+def _moved(curve: NurbsCurve, shift: Array) -> NurbsCurve:
+    return NurbsCurve(curve.degree, curve.knots, curve.control_points + shift, curve.weights)
