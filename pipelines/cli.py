@@ -1,4 +1,4 @@
-"""The command line: `patchwright check | repair | convert | run | demo`.
+"""The command line: `patchwright check | repair | intersect | convert | run | demo`.
 
 Only here do errors become sentences and exit codes: 0 done, 1 defects found, refused or not converged, 2 bad usage or
 input, 3 internal failure. Heavy packages are imported inside the commands, so that `--help` answers at once.
@@ -126,6 +126,28 @@ def run_(
     from patchwright.pipelines.run import run
 
     _finish(run(recipe, terminal=_terminal(quiet)), json)
+
+
+@app.command()
+def intersect(
+    files: Annotated[list[Path], typer.Argument(help="Two or more files; one alone with itself.", show_default=False)],
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="Curves: .step .igs .vtp .vtk .p3d, or the report as .json.")
+    ] = None,
+    tolerance: Annotated[float | None, typer.Option(help="Length in model units [1e-10 of the size].")] = None,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Find every curve and point that surfaces, meshes and assemblies share; exit code 1 when any place stays open."""
+    from patchwright.pipelines.intersect import run_intersect, sections_json, sections_lines
+
+    result = run_intersect(files, output, tolerance=tolerance, terminal=_terminal(quiet))
+    names = [str(f) for f in files]
+    if json:
+        _say_json(sections_json(result, names))
+    else:
+        _say("\n".join(sections_lines(result, names)))
+    raise typer.Exit(DONE if result.found.complete else FOUND)
 
 
 @app.command()

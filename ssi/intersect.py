@@ -104,11 +104,12 @@ def _pair(a: Operand, b: Operand, given: float | None) -> Intersection:
 def _surfaces(a: Surface, b: Surface, tolerance: float) -> Intersection:
     """Two surfaces: by closed form where there is one."""
     from patchwright.ssi.closed_forms import clip, closed_form
-    from patchwright.ssi.surface_surface import intersect_surfaces
 
     exact = closed_form(a, b, tolerance)
     if exact is not None:
         return exact
+    from patchwright.ssi.surface_surface import intersect_surfaces
+
     a, b = clip(a, b)
     return intersect_surfaces(a, b, tolerance)
 
