@@ -15,6 +15,7 @@ from patchwright.models.arrays import Array, BoolArray, IntArray, frozen
 from patchwright.repair.spline_space import interior_fit, refinement, uniform_collocation
 
 SAMPLES_PER_CELL = 6
+CREASE_TURN = 0.87  # cosine of 30 degrees: planes whose line is farther from the crease are not those of its sides
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -151,7 +152,8 @@ def with_end_tangents(edges: EdgeCurves, normals: Array, second: Array, fixed: B
             flat[crease] = ((leg * line).sum(1, keepdims=True) * line)[crease]
             new = np.linalg.norm(flat, axis=1, keepdims=True)
             old = np.linalg.norm(leg, axis=1, keepdims=True)
-            sound = (new[:, 0] > 0.5 * old[:, 0]) & ~fixed[which]  # a leg nearly along the normal is left
+            # a leg nearly along the normal is left, and so is one that a crease's own data contradict
+            sound = (new[:, 0] > np.where(crease, CREASE_TURN, 0.5) * old[:, 0]) & ~fixed[which]
             flat = np.divide(flat * old, new, out=flat.copy(), where=new > 0)
             points[sound, arm] = (points[:, tip] + flat)[sound]
         groups.append((which, points))

@@ -20,6 +20,7 @@ from patchwright.models.errors import ParameterError
 HARDY_EXPONENT = 0.001  # gamma of HJR 12
 HARDY_NEIGHBOURS = 8  # K of HJR 12, 5 to 10 in the paper
 RING = 4  # grid rows of found projections around a gap that carry the smooth fill
+OVERSHOOT = 1.0  # spreads of the found projections: how far beyond them a smooth fill may go
 ENOUGH = 3  # fewest found projections a thin-plate spline can stand on
 
 
@@ -67,7 +68,10 @@ def _collinear(sites: IntArray) -> bool:
 
 
 def _smooth(offsets: Array, found: BoolArray, noise: float) -> Array:
-    """One thin-plate spline through (or, with noise, near) the projections within `RING` rows of a gap."""
+    """One thin-plate spline through (or, with noise, near) the projections within `RING` rows of a gap.
+
+    Such a spline grows without bound away from its data: it is cut off `OVERSHOOT` spreads beyond them.
+    """
     from scipy.interpolate import RBFInterpolator
     from scipy.ndimage import binary_dilation
 
@@ -86,7 +90,8 @@ def _smooth(offsets: Array, found: BoolArray, noise: float) -> Array:
     # the smoothing parameter is the noise variance in units of the values' own variance
     smoothing = len(sites) * (noise / spread) ** 2 * 1e-3
     spline = RBFInterpolator(sites, (values - centre) / spread, kernel="thin_plate_spline", smoothing=smoothing)
-    out[~found] = spline(missing) * spread + centre
+    low, high = values.min() - OVERSHOOT * spread, values.max() + OVERSHOOT * spread
+    out[~found] = np.clip(spline(missing) * spread + centre, low, high)
     return out
 
 

@@ -18,6 +18,7 @@ from patchwright.repair.quad_layout import QuadLayout
 from patchwright.repair.spline_space import collocation, greville, uniform_collocation
 
 FIELD_SAMPLES = 33  # parameters at which an edge's normal field is stored
+OUTLIER = 0.5  # cosine of 60 degrees: a corner that far from its sector's mean is a fold, not a bend
 DAMPING = 0.02  # share of the wanted turn given up where the equations contradict each other
 
 # corner k of a quad as index of u and v
@@ -45,11 +46,13 @@ def _inner_normals(group: Array, cells: tuple[int, int], share: float) -> Array:
     return np.asarray(normals_of(du, dv)[:, CORNER_U, CORNER_V])
 
 
-def sector_normals(layout: QuadLayout, at_corners: Array) -> Array:
+def sector_normals(layout: QuadLayout, at_corners: Array, weights: Array | None = None) -> Array:
     """(m, 4, 3) the mean normal of the smooth sector each quad corner belongs to.
 
     A sector is the set of corners round a vertex that reach each other across smooth edges; sharp edges and boundaries
-    separate sectors, so a vertex on a crease has one normal per side.
+    separate sectors, so a vertex on a crease has one normal per side. `weights` (m, 4) tell how far each corner's
+    normal is to be trusted. A corner turned from the mean by more than `OUTLIER` has no part in the final mean, unless
+    that leaves none.
     """
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
@@ -69,11 +72,18 @@ def sector_normals(layout: QuadLayout, at_corners: Array) -> Array:
     j = np.concatenate([other_start, other_end])
     count = 4 * len(layout.quads)
     _, label = connected_components(coo_matrix((np.ones(len(i)), (i, j)), shape=(count, count)), directed=False)
-    total = np.zeros((label.max() + 1, 3))
-    np.add.at(total, label, at_corners.reshape(-1, 3))
-    length = np.linalg.norm(total, axis=1, keepdims=True)
-    total = np.divide(total, length, out=np.zeros_like(total), where=length > 0)
-    return np.asarray(total[label].reshape(-1, 4, 3))
+    normals = at_corners.reshape(-1, 3)
+    trust = np.ones(count) if weights is None else weights.reshape(-1)
+
+    def mean(share: Array) -> Array:
+        total = np.zeros((label.max() + 1, 3))
+        np.add.at(total, label, share[:, None] * normals)
+        return _unit(total)
+
+    first = mean(trust)
+    second = mean(np.where((first[label] * normals).sum(axis=1) > OUTLIER, trust, 0.0))
+    second = np.where((second == 0.0).all(axis=1, keepdims=True), first, second)
+    return np.asarray(second[label].reshape(-1, 4, 3))
 
 
 def smooth_edges(layout: QuadLayout) -> BoolArray:

@@ -29,6 +29,7 @@ from patchwright.repair.patch_fit import Target, fit_group, samples_for
 from patchwright.repair.patch_nets import PatchNets, evaluate, sides
 from patchwright.repair.quad_layout import QuadLayout
 from patchwright.repair.spline_space import collocation, uniform_collocation
+from patchwright.repair.stars import corner_angles, leaving, spread
 
 FIRST_CELLS = 2
 MOST_CELLS = 16
@@ -79,11 +80,15 @@ def resurface(
     edges = _fit_edge_curves(layout, target, edge_cells)
     everything = np.arange(len(layout.quads))
     state = _fit(layout, edges, patch_cells, everything, None, target, method, noise)
-    sectors = sector_normals(layout, corner_normals(state.nets))
-    ends = edge_end_normals(layout, sectors)
+    normals = corner_normals(state.nets)
+    # a corner counts by the sine of its angle, by which the error of its normal grows
+    trust = np.abs(np.sin(np.radians(corner_angles(layout, leaving(edges), normals))))
+    sectors = sector_normals(layout, normals, trust)
+    ends, free = edge_end_normals(layout, sectors), smooth_edges(layout)
 
     def aligned(curves: EdgeCurves) -> EdgeCurves:
-        return with_end_tangents(curves, *ends, np.zeros(len(layout.edges), dtype=bool))
+        flat = with_end_tangents(curves, *ends, np.zeros(len(layout.edges), dtype=bool))
+        return spread(layout, flat, sectors, free)
 
     edges = aligned(edges)
     state = _fit(layout, edges, patch_cells, everything, None, target, method, noise)

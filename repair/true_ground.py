@@ -115,12 +115,12 @@ class TrueGround:
             made = feet(surface, uv, target, self.accuracy, bounds)
             drift = np.linalg.norm(made.points - below, axis=1)
             sound = drift <= SLANT * found.distance[some] + np.abs(height) + self.accuracy
-            sound &= made.status == Outcome.CONVERGED
-            place[some[sound]], status[some[sound]] = made.points[sound], int(Outcome.CONVERGED)
+            sound &= made.status <= Outcome.LEFT_DOMAIN
+            place[some[sound]], status[some[sound]] = made.points[sound], made.status[sound]
             rest = ~sound
             if rest.any():
                 again = feet(surface, uv[rest], below[rest], self.accuracy, bounds)
-                good = again.status == Outcome.CONVERGED
+                good = again.status <= Outcome.LEFT_DOMAIN
                 place[some[rest][good]] = again.points[good]
                 status[some[rest]] = again.status
         return replace(found, points=place, distance=np.linalg.norm(place - query, axis=1)), status

@@ -36,7 +36,7 @@ class Outcome(IntEnum):
         """The reason in words."""
         return (
             "lies on the true surface",
-            "the true surface ends beside it",
+            "lies where the true surface ends",
             f"did not settle in {STEPS} steps",
             "settled farther from the triangle than the triangle is long",
             "the triangle comes from no surface",
@@ -87,10 +87,10 @@ class Bounds:
             out[:, k] = self.low[k] + np.mod(out[:, k] - self.low[k], width)
         return np.asarray(np.clip(out, self.low, self.high))
 
-    def at_border(self, uv: Array, step: Array) -> BoolArray:
-        """(n,) whether the step leads out of the box from its border."""
+    def outward(self, uv: Array, step: Array) -> BoolArray:
+        """(n, 2) in which directions the step leads out of the box from its border."""
         out = ((uv <= self.low) & (step < 0.0)) | ((uv >= self.high) & (step > 0.0))
-        return np.asarray((out & ~self.closed).any(axis=1))
+        return np.asarray(out & ~self.closed)
 
 
 def on_segments(
@@ -137,7 +137,7 @@ def on_segments(
         if len(new):
             Su, Sv = surface(uv[new, 0], uv[new, 1], (1, 0)), surface(uv[new, 0], uv[new, 1], (0, 1))
             step[new] = _solved(Su, Sv, -along[new], -rest[new])
-            left[new] = box.at_border(uv[new], step[new, :2])
+            left[new] = box.outward(uv[new], step[new, :2]).any(axis=1)
         trial_uv = box.kept(uv[on] + step[on, :2])
         trial_t = t[on] + step[on, 2]
         trial = np.asarray(surface(trial_uv[:, 0], trial_uv[:, 1]))
@@ -157,9 +157,9 @@ def on_segments(
 def feet(surface: Surface, uv: Array, queries: Array, accuracy: float, bounds: Bounds | None = None) -> OnSurface:
     """The feet of points on the surface, from starts nearby, by damped Gauss-Newton steps.
 
-    The rate is distance times curvature: a few steps for what lies near the surface. `queries` (n, 3); a foot has
-    converged when its next step is shorter than `accuracy` (or lands on a border that square steps would leave:
-    LEFT_DOMAIN).
+    The rate is distance times curvature: a few steps for what lies near the surface. `queries` (n, 3); a foot is
+    settled when its next step is shorter than `accuracy`: CONVERGED where it is square below its point, LEFT_DOMAIN
+    where it is the nearest place of the border and square steps would lead out.
     """
     box = bounds or Bounds.of(surface, uv)
     uv = box.kept(uv)
@@ -170,10 +170,21 @@ def feet(surface: Surface, uv: Array, queries: Array, accuracy: float, bounds: B
     on, share = np.arange(len(uv)), np.ones(len(uv))
     for _ in range(STEPS):
         Su, Sv = surface(uv[on, 0], uv[on, 1], (1, 0)), surface(uv[on, 0], uv[on, 1], (0, 1))
-        square, move = _square_step(Su, Sv, queries[on] - points[on])
-        outward = box.at_border(uv[on], square)
-        settled = (move <= enough[on]) | outward
-        status[on[settled]] = np.where(move <= enough[on], int(Outcome.CONVERGED), int(Outcome.LEFT_DOMAIN))[settled]
+        away = queries[on] - points[on]
+        square, move = _square_step(Su, Sv, away)
+        out = box.outward(uv[on], square)
+        for k, other in ((0, Sv), (1, Su)):  # at a border: slide along it
+            slide = np.einsum("ij,ij->i", away, other)
+            speed = np.linalg.norm(other, axis=1)
+            alone = np.divide(slide, speed**2, out=np.zeros_like(slide), where=speed > 0.0)
+            stuck = out[:, k]
+            square[stuck, k], square[stuck, 1 - k] = 0.0, np.where(out[:, 1 - k], 0.0, alone)[stuck]
+        again = box.outward(uv[on], square)
+        square[again] = 0.0
+        move = np.where(out.any(axis=1), np.linalg.norm(square[:, :1] * Su + square[:, 1:] * Sv, axis=1), move)
+        settled = move <= enough[on]
+        ended = np.where(out.any(axis=1), int(Outcome.LEFT_DOMAIN), int(Outcome.CONVERGED))
+        status[on[settled]] = ended[settled]
         on, square = on[~settled], square[~settled]
         if not len(on):
             break

@@ -78,3 +78,15 @@ def test_too_few_and_none_have_a_defined_result():
 def test_an_unknown_method_is_refused():
     with pytest.raises(ParameterError, match="known are hardy, smooth"):
         fill(np.zeros((3, 3)), np.zeros((3, 3), dtype=bool), method="guess")
+
+
+def test_smooth_fill_stays_near_its_data():
+    # a steep slope known in a corner only: the plane through it would reach 7 times the data's spread
+    u = np.linspace(0.0, 1.0, 17)
+    offsets = np.broadcast_to(u[:, None], (17, 17)).copy()
+    found = np.zeros((17, 17), dtype=bool)
+    found[:3, :3] = True
+    filled, _ = fill(offsets, found)
+    spread = float(np.ptp(offsets[found]))
+    assert filled.max() <= offsets[found].max() + spread * (1.0 + 1e-12)
+    assert np.array_equal(filled[found], offsets[found])

@@ -145,3 +145,14 @@ def test_scale_and_swapped_ends_change_nothing(scale):
     there = on_segments(other, uv + 0.01, 1 - t, scale * b, scale * a, 1e-13 * scale)
     assert np.allclose(there.points, scale * here.points, rtol=0, atol=1e-12 * scale)
     assert np.allclose(there.t, 1 - here.t, rtol=0, atol=1e-12)
+
+
+def test_feet_beyond_a_border_are_the_nearest_places_on_it():
+    surface = Cylinder((0, 0, 0), (0, 0, 1), 1.0, u=(0.0, np.pi / 2), v=(0.0, 1.0))
+    u = np.linspace(0.1, 1.4, 9)
+    points = np.stack([1.1 * np.cos(u), 1.1 * np.sin(u), np.full(9, 1.2)], axis=1)
+    found = feet(surface, np.full((9, 2), 0.5), points, 1e-13)
+    assert (found.status == Outcome.LEFT_DOMAIN).all()
+    assert np.abs(found.points - np.stack([np.cos(u), np.sin(u), np.ones(9)], axis=1)).max() < 1e-11
+    corner = feet(surface, np.full((1, 2), 0.5), np.array([[1.0, -0.3, -0.4]]), 1e-13)
+    assert np.allclose(corner.points, [[1.0, 0.0, 0.0]], rtol=0, atol=1e-12)
