@@ -20,6 +20,7 @@ _FACING = 0.34  # cosine of 70 degrees: how far a triangle may turn from the sur
 _GOOD = 0.25  # quality (1 is equilateral) that is never asked to be bettered
 _LENGTHENED = 1.05  # how much a collapse may lengthen an edge that is too long already
 _HALF = 0.8  # longest half of a split edge against the edge
+_APART = 0.02  # of a split edge: where its middle is nearer to a corner opposite, the edge is one to flip
 _REFUSED = -9.0  # score of a collapse that is not allowed; below any quality
 
 
@@ -538,8 +539,8 @@ def place_on_ground(m, g, v, x, y, z, t):
 def split_edge(m, g, t, k, vertices, triangles, starts, long):
     """Put vertex `vertices` into side k of t, with new triangles from `triangles` on; whether that could be done.
 
-    A `long` edge is split even where a half is turned against the surface: slivers along a bent surface can be mended
-    only once they are short.
+    A `long` edge, the longest of its triangles, is split even where a half is turned against the surface: slivers along
+    a bent surface can be mended only once they are short.
     """
     B, T, F, R, X, v2t = m.B, m.T, m.F, m.R, m.X, m.v2t
     o = B[t, k]
@@ -573,6 +574,13 @@ def split_edge(m, g, t, k, vertices, triangles, starts, long):
         # halves hardly shorter than the whole would be split without end
         if max(distance(m, a, p), distance(m, p, b)) > _HALF * distance(m, a, b):
             return False
+    # turned or flat halves are borne only by the longest side, of which all new edges are short: slivers cut elsewhere
+    # would be cut without end
+    longest, whole = True, distance(m, a, b)
+    for x in (c, d):
+        if x >= 0:
+            if max(distance(m, a, x), distance(m, b, x)) > whole or distance(m, p, x) < _APART * whole:
+                longest = False
     for half in range(2):
         tri = t if half == 0 else o
         if tri < 0:
@@ -585,7 +593,7 @@ def split_edge(m, g, t, k, vertices, triangles, starts, long):
             good = quality(m, g, i, j, c if half == 0 else d, R[tri], np.int64(1)) > 0.0
             if piece == 0:
                 sound = good
-            elif sound and not good and not long:
+            elif not good and not (longest and (long or not sound)):
                 return False
     curve = F[t, k]
     n1, n2 = triangles, triangles + 1
