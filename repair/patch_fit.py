@@ -48,7 +48,7 @@ class FittedGroup:
     """Patches of one size.
 
     `nets` (k, M + 3, N + 3, 3); `grid` (k, m + 1, n + 1, 3) the points they approximate; `data` (k, m + 1, n + 1)
-    where those came from the input and not from gap filling; `status` one per patch; `outcomes` (5,) how many of the
+    where the input has surface there, found or missed, and not gap filling; `status` one per patch; `outcomes` (5,) how many of the
     inner points that hit data ended in each `Outcome` (without true surfaces all are NO_SURFACE).
     """
 
@@ -105,6 +105,10 @@ def fit_group(
         status.append(one)
     offset[bare[:, None, None] & ~guided] = 0.0
     grid = coons + offset[..., None] * normal  # HJR 10 and 13
+    missed = ~found
+    if missed.any():
+        # a ray may miss surface that is there: only what lies over gap filling is invented, the rest is judged as data
+        data[missed] = ~target.invented[target.tree.closest(grid[missed]).triangle]
     outcomes = np.bincount(hits.outcome[known], minlength=len(Outcome))
     return FittedGroup(_least_squares(rows, grid, cells), grid, data, tuple(status), outcomes)
 

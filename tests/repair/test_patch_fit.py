@@ -41,10 +41,9 @@ def test_a_hole_in_the_upper_of_two_sheets_is_seen_only_with_labels(labelled):
     height = network.nets.sample(33)[..., 2]
     if labelled:
         assert np.abs(height).max() < 1e-9
-        assert network.invented.any()
+        assert network.deviation.max() == pytest.approx(0.1)  # over the hole the nearest surface is the lower sheet
     else:
         assert height.min() < -0.05  # the dent a wrong skin makes
-        assert not network.invented.any()
 
 
 def tube_part(cells):
