@@ -118,12 +118,13 @@ def _self(item: Operand, given: float | None) -> Intersection:
     """One surface or mesh with itself."""
     from patchwright.models.analytic import Torus
     from patchwright.ssi.mesh_mesh import intersect_meshes
-    from patchwright.ssi.self_intersection import self_intersection
 
     if isinstance(item.thing, Triangulation):
         return intersect_meshes(item.thing)
     if not np.isfinite(item.size) or not (isinstance(item.thing, Torus) or hasattr(item.thing, "control_points")):
         return Intersection()  # of the analytic surfaces only a torus can meet itself
+    from patchwright.ssi.self_intersection import self_intersection
+
     found = self_intersection(item.thing, given or SHARE * item.size)
     return trimmed(trimmed(found, item.thing, item.trims, 0), item.thing, item.trims, 1)
 

@@ -69,7 +69,7 @@ def _cut(
 def _restricted(curve: IntersectionCurve, t0: float, t1: float) -> IntersectionCurve:
     part = curve.curve.restricted(t0, t1)
     uv_a, uv_b = (None if c is None else c.restricted(t0, t1) for c in (curve.uv_a, curve.uv_b))
-    at = curve.curve.closest(curve.points).parameters if len(curve.points) else np.zeros(0)
+    at = curve.curve.closest(curve.points).t if len(curve.points) else np.zeros(0)
     inner = curve.points[(at > t0) & (at < t1)]
     points = np.concatenate([curve.curve(np.array([t0])), inner, curve.curve(np.array([t1]))])
     return replace(curve, curve=part, uv_a=uv_a, uv_b=uv_b, points=points, closed=False)
