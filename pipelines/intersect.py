@@ -214,7 +214,9 @@ def _scene(result: Sections, path: Path) -> Scene:
         scene.surface(body)
     lines = [polyline(c) for c in result.found.curves]
     if lines:
-        scene.lines(np.concatenate([np.stack([p[:-1], p[1:]], axis=1) for p in lines]), colour="#c03030", width=4.0)
+        scene.lines(
+            np.concatenate([np.stack([p[:-1], p[1:]], axis=1) for p in lines]), colour="#c03030", width=6.0, tubes=True
+        )
     if result.found.points:
         scene.points(np.array([p.point for p in result.found.points]), colour="#202020", width=12.0)
     return scene

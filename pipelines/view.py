@@ -98,7 +98,11 @@ def _add(plotter: Any, pv: Any, layer: dict[str, Any], arrays: dict[str, Any]) -
             cells = np.column_stack([np.full(len(points) // 2, 2), np.arange(len(points)).reshape(-1, 2)]).ravel()
             mesh = pv.PolyData(points, lines=cells)
             plotter.add_mesh(
-                mesh, color=layer.get("colour", "#c03030"), line_width=layer.get("width", 2.0), lighting=False
+                mesh,
+                color=layer.get("colour", "#c03030"),
+                line_width=layer.get("width", 2.0),
+                render_lines_as_tubes=layer.get("tubes", False),
+                lighting=False,
             )
     elif kind == "points":
         points = arrays[f"{key}.points"]

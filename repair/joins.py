@@ -52,7 +52,8 @@ def sector_normals(layout: QuadLayout, at_corners: Array, weights: Array | None 
     A sector is the set of corners round a vertex that reach each other across smooth edges; sharp edges and boundaries
     separate sectors, so a vertex on a crease has one normal per side. `weights` (m, 4) tell how far each corner's
     normal is to be trusted. A corner turned from the mean by more than `OUTLIER` has no part in the final mean, unless
-    that leaves none.
+    that leaves none. At a cusp, where the normals are spread over more than a cone of that opening, there is no common
+    normal: zero.
     """
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
@@ -83,6 +84,8 @@ def sector_normals(layout: QuadLayout, at_corners: Array, weights: Array | None 
     first = mean(trust)
     second = mean(np.where((first[label] * normals).sum(axis=1) > OUTLIER, trust, 0.0))
     second = np.where((second == 0.0).all(axis=1, keepdims=True), first, second)
+    along = np.bincount(label, trust * (first[label] * normals).sum(axis=1))
+    second[along < OUTLIER * np.bincount(label, trust)] = 0.0
     return np.asarray(second[label].reshape(-1, 4, 3))
 
 
@@ -149,7 +152,9 @@ def edge_fields(layout: QuadLayout, sides: Array, sectors: Array) -> Array:
     total = _unit(total)
     # the ends jump to the sector normal; the jump is spread linearly along the edge, so the field stays smooth
     t = np.linspace(0.0, 1.0, sides.shape[2])[:, None]
-    total = total + (1 - t) * (start[:, :1] - total[:, :1]) + t * (start[:, 1:] - total[:, -1:])
+    there = np.any(start != 0.0, axis=2, keepdims=True)  # at a cusp every edge keeps its own normal
+    jump = np.where(there, start - total[:, [0, -1]], 0.0)
+    total = total + (1 - t) * jump[:, :1] + t * jump[:, 1:]
     return _unit(total)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from patchwright.repair.pairing import QuadMesh
 PATH_POINTS = 9  # of a smooth edge
 LEAP = 2.0  # times a chord's step: where the surface stands steeper than 60 degrees to it, the chord's feet leap
 ROUND = 4.0  # times the chord: longest way round a bend; half a circle needs 1.6
+BETWEEN = 3  # rounds, for strips of several edges that press against a feature
 STRAIGHTENING = 60  # passes; each leaves cos(pi / 8) of the slowest bend of nine points, all together 1 %
 
 
@@ -74,6 +76,7 @@ def trace_paths(quad_mesh: QuadMesh, features: Features) -> LayoutEdges:
     parents = np.ascontiguousarray(edges[smooth])
     kernel.land(mesh, ground, parents, quad_mesh.region[one], chord, normals, inner, triangle)
     _go_round(quad_mesh, features, parents, quad_mesh.region[one], normals, inner)
+    pressed = on_curves(ground, inner, triangle).any(axis=1)
     # all paths in one array
     count = np.full(e, PATH_POINTS, dtype=np.int64)
     count[which] = np.diff(arc_offsets)
@@ -87,6 +90,8 @@ def trace_paths(quad_mesh: QuadMesh, features: Features) -> LayoutEdges:
     points[path_offsets[which][row] + place] = stretch
     points[path_offsets[:-1]] = mesh.X[edges[:, 0]]
     points[path_offsets[1:] - 1] = mesh.X[edges[:, 1]]
+    beside = np.flatnonzero(pressed & (two >= 0))
+    _lead_between(quad_mesh, number, smooth[beside], edge_quads, triangle[beside], path_offsets, points)
     total = float(features.lengths.sum())
     covered = float((high - low).sum())
     return LayoutEdges(
@@ -168,6 +173,67 @@ def _go_round(
         line[:, 1:-1] = out.reshape(len(line), -1, 3)
         starts, at = at, starts
     inner[leaps[found]] = line[:, 1:-1]
+
+
+def on_curves(ground: Any, points: Array, triangle: IntArray) -> BoolArray:
+    """Whether points (..., 3) of triangles (...,), -1 none, lie on a side that a feature curve blocks."""
+    eps = 1e-9  # of the side: a walk that stops at a blocked side stops on it but for rounding
+    corners = ground.v[ground.t[triangle]]
+    out = np.zeros(triangle.shape, dtype=bool)
+    for k in range(3):
+        a, side = corners[..., k, :], corners[..., (k + 1) % 3, :] - corners[..., k, :]
+        size = (side * side).sum(axis=-1)
+        off = np.linalg.norm(np.cross(side, points - a), axis=-1)
+        out |= (ground.block[triangle, k] >= 0) & (off <= eps * size)
+    return np.asarray(out & (triangle >= 0))
+
+
+def _lead_between(
+    quad_mesh: QuadMesh,
+    quad_edges: IntArray,
+    which: IntArray,
+    edge_quads: IntArray,
+    triangle: IntArray,
+    path_offsets: IntArray,
+    points: Array,
+) -> None:
+    """Lead smooth edges that press against a feature through the middle between the opposite sides, in place.
+
+    The chord of such an edge leaves its region where the feature bulges into it, and its feet all lie on the feature:
+    no room is left for the patch between the two. The middle line of the Coons patch over both its quads keeps off.
+    `triangle` (k, PATH_POINTS - 2) of the paths' inner points; `points` all paths.
+    """
+    from patchwright.repair import _surface_walk_kernel as walker
+    from patchwright.repair.edge_curves import resample
+
+    if not len(which):
+        return
+    ground, quads = quad_mesh.ground, quad_mesh.quads
+    x = quad_mesh.mesh.X
+    share = np.linspace(0.0, 1.0, PATH_POINTS)[:, None]
+    starts = np.ascontiguousarray(triangle.reshape(-1))
+    out, at = np.empty((len(starts), 3)), np.empty(len(starts), dtype=np.int64)
+    rows = path_offsets[which][:, None] + np.arange(PATH_POINTS)
+    begin = points[rows[:, 0]]
+    for _ in range(BETWEEN):
+        lines = resample(points, path_offsets, PATH_POINTS)
+        middle = np.zeros((len(which), PATH_POINTS, 3))
+        for side in (0, 1):
+            quad = edge_quads[which, side]
+            own = (quad_edges[quad] == which[:, None]).argmax(axis=1)
+            line = lines[quad_edges[quad, (own + 2) % 4]]
+            # the opposite side's vertex next to this edge's first one
+            forth = (x[quads[quad, own]] == begin).all(axis=1)
+            near = np.where(forth, quads[quad, (own + 3) % 4], quads[quad, (own + 2) % 4])
+            turned = (line[:, 0] != x[near]).any(axis=1)
+            line[turned] = line[turned, ::-1]
+            middle += 0.5 * line
+        first, last = begin - middle[:, 0], points[rows[:, -1]] - middle[:, -1]
+        middle += (1.0 - share) * first[:, None] + share * last[:, None]
+        wanted = np.ascontiguousarray(middle[:, 1:-1]).reshape(-1, 3)
+        walker.walk_many(wanted, starts, ground.v, ground.t, ground.nb, ground.block, out, at)
+        points[rows[:, 1:-1]] = out.reshape(len(which), -1, 3)
+        starts, at = at, starts
 
 
 def quad_tags(quad_mesh: QuadMesh, features: Features) -> IntArray:

@@ -10,7 +10,9 @@ import numpy as np
 from patchwright.models.arrays import Array, IntArray, frozen
 from patchwright.repair.edge_curves import EdgeCurves
 from patchwright.repair.quad_layout import QuadLayout
-from patchwright.repair.spline_space import uniform_collocation
+from patchwright.repair.spline_space import greville, uniform_collocation
+
+FOLD_SAMPLES = 13
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -82,6 +84,29 @@ def sides(
         points[flip] = points[flip, ::-1]
         out.append(points)
     return out[0], out[1], out[2], out[3]
+
+
+def coons_nets(south: Array, north: Array, west: Array, east: Array) -> Array:
+    """(k, M, N, 3) control nets of the bilinear Coons patches of four boundary control rows, (k, M, 3) and (k, N, 3).
+
+    Exact: in a spline space the coefficients of the parameter itself are the Greville abscissae.
+    """
+    u = greville(south.shape[1] - 3)[:, None, None]
+    v = greville(west.shape[1] - 3)[None, :, None]
+    ruled = (1 - u) * west[:, None] + u * east[:, None] + (1 - v) * south[:, :, None] + v * north[:, :, None]
+    x00, xm0, x0n, xmn = (x[:, None, None] for x in (south[:, 0], south[:, -1], north[:, 0], north[:, -1]))
+    return np.asarray(ruled - ((1 - u) * (1 - v) * x00 + u * (1 - v) * xm0 + (1 - u) * v * x0n + u * v * xmn))
+
+
+def folds(nets: PatchNets, count: int = FOLD_SAMPLES) -> Array:
+    """(m,) share of neighbouring samples of each patch between which its normal turns by more than a right angle.
+
+    Zero on a patch that does not fold, however bent, as long as it turns by less than that within a sample's step.
+    """
+    normal = normals_of(nets.sample(count, (1, 0)), nets.sample(count, (0, 1)))
+    along_u = (normal[:, 1:] * normal[:, :-1]).sum(axis=-1) < 0.0
+    along_v = (normal[:, :, 1:] * normal[:, :, :-1]).sum(axis=-1) < 0.0
+    return np.asarray(0.5 * (along_u.mean(axis=(1, 2)) + along_v.mean(axis=(1, 2))))
 
 
 def normals_of(du: Array, dv: Array) -> Array:

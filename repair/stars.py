@@ -1,4 +1,4 @@
-"""Stars: the edges that leave a vertex, turned apart in its tangent plane until no patch has a corner of next to nothing.
+"""Stars: the edges that leave a vertex, turned apart in its tangent plane until every corner of a patch is open.
 
 Where two sides of a patch leave a corner in nearly one direction, or in nearly opposite ones, its normal there is
 undefined, and the fit folds. The end tangents of smooth edges are free to turn a little in the tangent plane: the curve
@@ -13,7 +13,8 @@ from patchwright.models.arrays import Array, BoolArray
 from patchwright.repair.edge_curves import EdgeCurves
 from patchwright.repair.quad_layout import QuadLayout
 
-LEAST_CORNER = 20.0  # degrees; a corner's cross product is then a third of the product of its legs
+LEAST_CORNER = 10.0  # degrees
+ROOM = 0.25  # of the shortest edge at a vertex: how far a turned leg may reach sideways
 PASSES = 60  # a pass halves what is missing; chains of eight corners settle to a degree
 
 
@@ -44,7 +45,8 @@ def spread(layout: QuadLayout, curves: EdgeCurves, sectors: Array, free: BoolArr
 
     Parameters
     ----------
-    sectors : (m, 4, 3) unit normal of the smooth sector at each corner (`joins.sector_normals`)
+    sectors : (m, 4, 3) unit normal of the smooth sector at each corner (`joins.sector_normals`), zero at a cusp, which
+        is left alone
     free : (e,) edges that may turn; the others keep their tangents
 
     Corners between `LEAST_CORNER` and 180 degrees less that stay as they are; the others share what is missing with
@@ -52,7 +54,8 @@ def spread(layout: QuadLayout, curves: EdgeCurves, sectors: Array, free: BoolArr
     """
     tips = leaving(curves)
     angle = corner_angles(layout, tips, sectors)
-    wrong = (angle < LEAST_CORNER) | (angle > 180.0 - LEAST_CORNER)
+    known = (sectors != 0.0).any(axis=2)
+    wrong = known & ((angle < LEAST_CORNER) | (angle > 180.0 - LEAST_CORNER))
     if not wrong.any():
         return curves
     one, two, end_one, end_two = _corner_ends(layout)
@@ -64,6 +67,7 @@ def spread(layout: QuadLayout, curves: EdgeCurves, sectors: Array, free: BoolArr
     for _ in range(PASSES):
         now = angle + turn[slot_two] - turn[slot_one]
         missing = np.maximum(LEAST_CORNER - now, 0.0) - np.maximum(now - (180.0 - LEAST_CORNER), 0.0)
+        missing[~known] = 0.0
         np.add.at(turn, slot_one, -0.5 * share_one * missing)
         np.add.at(turn, slot_two, 0.5 * share_two * missing)
     # the axis of every edge end: the normal of the sector it leaves through
@@ -78,6 +82,12 @@ def spread(layout: QuadLayout, curves: EdgeCurves, sectors: Array, free: BoolArr
     leg = c * leg + s * np.cross(n, leg) + (1.0 - c) * (n * leg).sum(axis=1, keepdims=True) * n
     controls = curves.controls.copy()
     edge, end = turned // 2, turned % 2
+    # in a slim patch a long leg turned would cross the side opposite: it gets shorter
+    chord = np.linalg.norm(layout.vertices[layout.edges[:, 1]] - layout.vertices[layout.edges[:, 0]], axis=1)
+    shortest = np.full(len(layout.vertices), np.inf)
+    np.minimum.at(shortest, layout.edges, chord[:, None])
+    aside = np.linalg.norm(leg, axis=1) * np.abs(s[:, 0])
+    leg *= np.minimum(1.0, ROOM * shortest[layout.edges[edge, end]] / np.maximum(aside, np.finfo(float).tiny))[:, None]
     tip = np.where(end == 0, curves.offsets[edge], curves.offsets[edge + 1] - 1)
     controls[tip + np.where(end == 0, 1, -1)] = controls[tip] + leg
     return EdgeCurves(curves.cells, curves.offsets, controls)

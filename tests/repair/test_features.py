@@ -10,7 +10,8 @@ from layout_shapes import cube, cylinder, jittered, moved, plate_with_hole, sphe
 
 from patchwright.models import GeometryError, Triangulation
 from patchwright.models.adjacency import Adjacency
-from patchwright.repair.features import BOUNDARY, FOLLOWED, SHARP, _cut_teeth, find_features
+from patchwright.repair.feature_cleaning import cut_teeth
+from patchwright.repair.features import BOUNDARY, FOLLOWED, SHARP, find_features
 
 
 @pytest.mark.parametrize("intervals", [1, 5])
@@ -178,5 +179,5 @@ def test_a_tooth_is_cut_off():
     neighbours = np.asarray(adjacency.neighbours)
     for width, firm, straight in ((0.2, none, True), (0.05, none, False), (0.2, line(1, 4), False)):
         normals, sharp = np.array(body.normals), line(0, 1, 4, 2, 3)
-        _cut_teeth(body, neighbours, normals, edges, sides, sharp, firm, length, width)
+        cut_teeth(body, neighbours, normals, edges, sides, sharp, firm, length, width)
         np.testing.assert_array_equal(sharp, line(0, 1, 2, 3) if straight else line(0, 1, 4, 2, 3))

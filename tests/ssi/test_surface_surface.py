@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
@@ -131,7 +132,9 @@ PAIRS = {
         2.0 * ELLIPSE, 2, False,
     ),
     "Viviani": (Sphere((0, 0, 0), 1.0), Cylinder((0.5, 0, 0), (0, 0, 1), 0.5, v=(-2, 2)), ELLIPSE, 1, False),
-    "sphere outside a cylinder": (Sphere((0, 0, 0), 1.0), Cylinder((2, 0, 0), (0, 0, 1), 1.0, v=(-2, 2)), 0.0, 1, False),
+    "sphere beside a cylinder": (
+        Sphere((0, 0, 0), 1.0), Cylinder((2, 0, 0), (0, 0, 1), 1.0, v=(-2, 2)), 0.0, 1, False,
+    ),
     "sphere inside a cylinder": (
         Sphere((0, 0, 0), 1.0), Cylinder((0, 0, 0), (0, 0, 1), 1.0, v=(-2, 2)), 2.0 * math.pi, 0, True,
     ),
@@ -140,7 +143,8 @@ PAIRS = {
         8.0 * math.pi, 2, False,
     ),
     "plane on a torus": (
-        Torus((0, 0, 0), (0, 0, 1), 2.0, 1.0), Plane((0, 0, 1), (0, 0, 1), u=(-4, 4), v=(-4, 4)), 4.0 * math.pi, 0, True,
+        Torus((0, 0, 0), (0, 0, 1), 2.0, 1.0), Plane((0, 0, 1), (0, 0, 1), u=(-4, 4), v=(-4, 4)),
+        4.0 * math.pi, 0, True,
     ),
     "cone apex on a pole": (
         Cone((0, 0, 1), (0, 0, 1), 0.5, v=(-3, 0)), Sphere((0, 0, 0), 1.0), 2.0 * math.pi * math.sin(1.0), 1, False,
@@ -177,7 +181,7 @@ def test_nearly_equal_cylinders_are_two_loops(delta: float) -> None:
 
     cuts = [0.5 * math.pi - t for t in (0.3, 0.1, 0.03, 1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 3e-5)]
     ends = [0.0, *cuts, 0.5 * math.pi]
-    quarter = sum(quad(speed, p, q, epsabs=1e-13)[0] for p, q in zip(ends[:-1], ends[1:], strict=True))
+    quarter = sum(quad(speed, p, q, epsabs=1e-13)[0] for p, q in itertools.pairwise(ends))
     assert found.length == pytest.approx(8.0 * quarter, rel=1e-7)
 
 
