@@ -12,15 +12,18 @@ from dataclasses import replace
 
 import numpy as np
 
+from patchwright.models.analytic import Cylinder, Plane, Sphere
 from patchwright.models.errors import ParameterError
 from patchwright.models.surface import Surface
 from patchwright.models.triangulation import Triangulation
-from patchwright.ssi.intersection import Intersection
+from patchwright.ssi.embedded import is_embedded
+from patchwright.ssi.intersection import Intersection, Unresolved
 from patchwright.ssi.operands import Input, Operand, meeting, operands
 from patchwright.ssi.trimmed import trimmed
 from patchwright.ssi.triple_points import triple_points
 
 SHARE = 1e-10  # of the smaller surface's size: the tolerance nobody gave
+ONCE = (Plane, Cylinder, Sphere)  # surfaces that never meet themselves, seams apart
 Progress = Callable[[str, float], None]
 
 
@@ -60,7 +63,7 @@ def intersect(
     if alone:
         for i, item in enumerate(items):
             say("self-intersections", i / len(items))
-            found.append(_numbered(_self(item, tolerance), i, i))
+            found.append(_numbered(_self(item), i, i))
     sizes = [item.size for item in items if np.isfinite(item.size)]
     widest = tolerance or SHARE * max(sizes, default=1.0)
     pairs = meeting(items, alone, widest)
@@ -114,19 +117,18 @@ def _surfaces(a: Surface, b: Surface, tolerance: float) -> Intersection:
     return intersect_surfaces(a, b, tolerance)
 
 
-def _self(item: Operand, given: float | None) -> Intersection:
-    """One surface or mesh with itself."""
-    from patchwright.models.analytic import Torus
+def _self(item: Operand) -> Intersection:
+    """One surface or mesh with itself; of a free-form surface only a proof that it does not."""
     from patchwright.ssi.mesh_mesh import intersect_meshes
 
     if isinstance(item.thing, Triangulation):
         return intersect_meshes(item.thing)
-    if not np.isfinite(item.size) or not (isinstance(item.thing, Torus) or hasattr(item.thing, "control_points")):
-        return Intersection()  # of the analytic surfaces only a torus can meet itself
-    from patchwright.ssi.self_intersection import self_intersection
-
-    found = self_intersection(item.thing, given or SHARE * item.size)
-    return trimmed(trimmed(found, item.thing, item.trims, 0), item.thing, item.trims, 1)
+    if isinstance(item.thing, ONCE) or (np.isfinite(item.size) and is_embedded(item.thing)):
+        return Intersection()
+    box = item.thing.domain
+    return Intersection(
+        unresolved=(Unresolved(box, box, "whether this one surface meets itself is neither proved nor searched"),)
+    )
 
 
 def _numbered(found: Intersection, i: int, j: int) -> Intersection:

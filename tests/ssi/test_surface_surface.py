@@ -212,6 +212,23 @@ def test_motion_scale_and_order_change_nothing(scale: float, swap: bool) -> None
         assert found.residual <= 1e-10 * scale * 1.5
 
 
+@pytest.mark.parametrize("seed", range(12))
+def test_random_graphs_against_contours(seed: int) -> None:
+    random = np.random.default_rng(seed)
+
+    def rough(spans: int, height: float) -> NurbsSurface:
+        s = flat() if spans == 1 else graph(lambda x, y: 0.0 * x, spans=spans)
+        net = s.control_points.copy()
+        net[..., 2] = height * random.standard_normal(net.shape[:2])
+        return NurbsSurface(s.degree, s.knots, net)
+
+    a, b = rough(int(random.integers(1, 6)), 0.3), rough(int(random.integers(1, 4)), 0.1)
+    found = checked(a, b, tolerance=1e-9)
+    points = [c.curve(np.linspace(*c.curve.domain, 1001))[:, :2] for c in found.curves]
+    length = sum(float(np.linalg.norm(np.diff(x, axis=0), axis=1).sum()) for x in points)
+    assert length == pytest.approx(contour(a, b, 801)[1], rel=2e-3, abs=2e-4)
+
+
 def test_apart_is_empty_and_proved() -> None:
     found = intersect_surfaces(flat(), flat(1e-6), 1e-9)
     assert found.complete
