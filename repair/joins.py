@@ -18,7 +18,8 @@ from patchwright.repair.quad_layout import QuadLayout
 from patchwright.repair.spline_space import collocation, greville, uniform_collocation
 
 FIELD_SAMPLES = 33  # parameters at which an edge's normal field is stored
-OUTLIER = 0.5  # cosine of 60 degrees: a corner that far from its sector's mean is a fold, not a bend
+OUTLIER = 0.0  # cosine: a corner turned from the mean of its sector by more than a right angle is a fold, not a bend
+CUSP = 0.5  # mean cosine between the normals round a vertex and their mean, below which they have no common one
 DAMPING = 0.02  # share of the wanted turn given up where the equations contradict each other
 
 # corner k of a quad as index of u and v
@@ -85,7 +86,7 @@ def sector_normals(layout: QuadLayout, at_corners: Array, weights: Array | None 
     second = mean(np.where((first[label] * normals).sum(axis=1) > OUTLIER, trust, 0.0))
     second = np.where((second == 0.0).all(axis=1, keepdims=True), first, second)
     along = np.bincount(label, trust * (first[label] * normals).sum(axis=1))
-    second[along < OUTLIER * np.bincount(label, trust)] = 0.0
+    second[along < CUSP * np.bincount(label, trust)] = 0.0
     return np.asarray(second[label].reshape(-1, 4, 3))
 
 

@@ -133,7 +133,7 @@ def _go_round(
     tip = np.empty((2, len(leaps)), dtype=np.int64)  # the triangle each way begins and ends on
     for side in (0, 1):
         own = np.ascontiguousarray(ends[leaps, side : side + 1])
-        at = np.empty((len(leaps), 1), dtype=np.int64)
+        at: IntArray = np.empty((len(leaps), 1), dtype=np.int64)
         kernel.land(mesh, ground, own, region[leaps], mesh.X[own], normals[leaps], np.empty((len(leaps), 1, 3)), at)
         tip[side] = at[:, 0]
     points = features.body.vertices
@@ -161,11 +161,11 @@ def _go_round(
     if not found:
         return
     offsets = np.concatenate([[0], np.cumsum([len(way) for way in ways])])
-    line = resample(np.concatenate(ways), offsets, PATH_POINTS)
-    line, triangle = np.ascontiguousarray(line), np.empty((len(line), PATH_POINTS), dtype=np.int64)
+    line = np.ascontiguousarray(resample(np.concatenate(ways), offsets, PATH_POINTS))
+    triangle = np.empty((len(line), PATH_POINTS), dtype=np.int64)
     walker.walk_chain(line.copy(), tip[0, found], ground.v, ground.t, ground.nb, ground.block, line, triangle)
     line[:, 0], line[:, -1] = begin[leaps[found]], finish[leaps[found]]
-    starts = np.ascontiguousarray(triangle[:, 1:-1].reshape(-1))
+    starts: IntArray = np.ascontiguousarray(triangle[:, 1:-1].reshape(-1))
     out, at = np.empty((len(starts), 3)), np.empty(len(starts), dtype=np.int64)
     for _ in range(STRAIGHTENING):
         middle = np.ascontiguousarray(0.5 * (line[:, :-2] + line[:, 2:])).reshape(-1, 3)

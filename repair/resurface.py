@@ -119,15 +119,17 @@ def resurface(
         barren_patches[redo] = np.where(state.error > WORTH * before, barren_patches + 1, 0)[redo]
     state = _unfolded(layout, state, target, tolerance)
     say("joining patches", 0.95)
-    nets = state.nets
-    for _ in range(JOIN_PASSES):
-        nets = follow_fields(layout, nets, edge_fields(layout, side_normals(layout, nets), sectors))
-    error = _patch_errors(layout, nets, everything, target, state.invented)
-    # a join that spoils a patch is undone for that patch: position before smoothness
-    spoiled = np.flatnonzero(error > np.maximum(2.0 * state.error, tolerance.fit))
-    if len(spoiled):
-        nets = _merge(nets, state.nets, spoiled)
-        error[spoiled] = state.error[spoiled]
+    nets, error = state.nets, state.error
+    for turn in range(JOIN_PASSES):
+        moved = follow_fields(layout, nets, edge_fields(layout, side_normals(layout, nets), sectors))
+        found = _patch_errors(layout, moved, everything, target, state.invented)
+        # a join that spoils a patch is undone for that patch: position before smoothness
+        allowed = np.maximum(error if turn else 2.0 * error, tolerance.fit)
+        spoiled = np.flatnonzero(found > allowed)
+        if len(spoiled):
+            moved = _merge(moved, nets, spoiled)
+            found[spoiled] = error[spoiled]
+        nets, error = moved, found
     return PatchNetwork(layout, edges, nets, state.invented, error)
 
 

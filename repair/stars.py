@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from patchwright.models.arrays import Array, BoolArray
+from patchwright.models.arrays import Array, BoolArray, IntArray
 from patchwright.repair.edge_curves import EdgeCurves
 from patchwright.repair.quad_layout import QuadLayout
 
@@ -93,7 +93,7 @@ def spread(layout: QuadLayout, curves: EdgeCurves, sectors: Array, free: BoolArr
     return EdgeCurves(curves.cells, curves.offsets, controls)
 
 
-def _corner_ends(layout: QuadLayout) -> tuple[Array, Array, Array, Array]:
+def _corner_ends(layout: QuadLayout) -> tuple[IntArray, IntArray, IntArray, IntArray]:
     """For every corner (m, 4) the edge it leaves by, the edge it is reached by, and which end of each is there."""
     ahead, back = layout.quad_edges, np.roll(layout.quad_edges, 1, axis=1)
     ahead_end = layout.edge_reversed.astype(np.int64)
