@@ -150,7 +150,7 @@ def _closest_points(
                 for i in range(code >> 3, (code >> 3) + (code & 7)):
                     d, u, v, w = closest_on_triangle(corners, i, px, py, pz)
                     if d < best or (d == best and index[i] < found):
-                        best, found, wa, wb, wc, row = d, index[i], u, v, w, i
+                        best, found, wa, wb, wc, row = d, index[i], u, v, w, np.int64(i)
         triangle[r] = found
         distance[r] = np.sqrt(best)
         barycentric[r, 0], barycentric[r, 1], barycentric[r, 2] = wa, wb, wc

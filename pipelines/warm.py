@@ -13,8 +13,12 @@ import subprocess
 import sys
 from importlib.util import find_spec
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from patchwright.pipelines.progress import Terminal
+
+if TYPE_CHECKING:
+    from patchwright.models.triangulation import Triangulation
 
 WITNESS = "patchwright.repair._remesh_kernel"  # compiled late in every repair of a triangulation
 _started = False  # in this process
@@ -53,20 +57,45 @@ def spare_collections() -> None:
 
 
 def main() -> None:
-    """Lay out and fit a small noisy ball, which needs every kernel of those stages."""
+    """Lay out and fit a small noisy torus and measure its patches, which needs every kernel of those stages.
+
+    What the first process needs first, evaluation and trees, comes last here: by then it is there to be loaded.
+    """
     spare_collections()
     import numpy as np
 
-    from patchwright.models.samples import sphere
+    from patchwright.models.assembly import Assembly, Part
+    from patchwright.models.cad.seams import edge_deviation
     from patchwright.models.tolerance import Tolerance
     from patchwright.models.tree import Tree
+    from patchwright.models.triangulation import Triangulation
     from patchwright.repair.patch_fit import Target
     from patchwright.repair.quad_layout import quad_layout
     from patchwright.repair.resurface import resurface
 
-    body = sphere().assembly.triangulation
+    body = _noisy_torus()
+    layout = quad_layout(body, target=60)
     target = Target(Tree.of(body), np.zeros(len(body), dtype=bool))
-    resurface(quad_layout(body, target=60), target, Tolerance.of(body, fit=body.diagonal))
+    network = resurface(layout, target, Tolerance.of(body, fit=body.diagonal))
+    nothing = Triangulation(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64))
+    parts = tuple(Part("", nothing, surface=surface) for surface in network.surfaces())
+    edge_deviation(Assembly(parts, topology=network.topology()))
+
+
+def _noisy_torus(rows: int = 24, columns: int = 48) -> Triangulation:
+    import numpy as np
+
+    from patchwright.models.triangulation import Triangulation
+
+    i, j = (k.reshape(-1) for k in np.meshgrid(np.arange(rows), np.arange(columns), indexing="ij"))
+    a, b = 2.0 * np.pi * i / rows, 2.0 * np.pi * j / columns
+    away = 3.0 + np.cos(a)
+    points = np.stack([away * np.cos(b), away * np.sin(b), np.sin(a)], axis=1)
+    points += np.random.default_rng(1).normal(scale=0.02, size=points.shape)
+    up, on = (i + 1) % rows, (j + 1) % columns
+    here, above, across, beside = i * columns + j, up * columns + j, up * columns + on, i * columns + on
+    triangles = np.concatenate([np.stack([here, beside, across], axis=1), np.stack([here, across, above], axis=1)])
+    return Triangulation(points, triangles)
 
 
 if __name__ == "__main__":

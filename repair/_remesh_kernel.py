@@ -578,9 +578,8 @@ def split_edge(m, g, t, k, vertices, triangles, starts, long):
     # would be cut without end
     longest, whole = True, distance(m, a, b)
     for x in (c, d):
-        if x >= 0:
-            if max(distance(m, a, x), distance(m, b, x)) > whole or distance(m, p, x) < _APART * whole:
-                longest = False
+        if x >= 0 and (max(distance(m, a, x), distance(m, b, x)) > whole or distance(m, p, x) < _APART * whole):
+            longest = False
     for half in range(2):
         tri = t if half == 0 else o
         if tri < 0:

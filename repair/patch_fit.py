@@ -48,8 +48,8 @@ class FittedGroup:
     """Patches of one size.
 
     `nets` (k, M + 3, N + 3, 3); `grid` (k, m + 1, n + 1, 3) the points they approximate; `data` (k, m + 1, n + 1)
-    where the input has surface there, found or missed, and not gap filling; `status` one per patch; `outcomes` (5,) how many of the
-    inner points that hit data ended in each `Outcome` (without true surfaces all are NO_SURFACE).
+    where the input has surface there, found or missed, and not gap filling; `status` one per patch; `outcomes` (5,) how
+    many of the inner points that hit data ended in each `Outcome` (without true surfaces all are NO_SURFACE).
     """
 
     nets: Array

@@ -115,4 +115,4 @@ def meeting(items: Sequence[Operand], alone: bool, margin: float) -> IntArray:
     if not alone:
         pairs = pairs[source[pairs[:, 0]] != source[pairs[:, 1]]]
     apart = [items[i].source != items[j].source or not items[i].edges & items[j].edges for i, j in pairs.tolist()]
-    return pairs[np.array(apart, dtype=bool)]
+    return np.asarray(pairs[np.array(apart, dtype=bool)])
