@@ -293,6 +293,7 @@ def _figures(
         "largest seam gap": max((s.gap for s in seams if s.kind != "free"), default=0.0),
         "largest smooth seam angle": float(smooth.max()),
         "median smooth seam angle": float(np.median(smooth)),
+        "smooth seam angle, 99 %": float(np.percentile(smooth, 99.0)),
         "volume": mended.triangulation.volume if mended.closed else float("nan"),
     }
 
