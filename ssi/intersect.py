@@ -105,10 +105,11 @@ def _pair(a: Operand, b: Operand, given: float | None) -> Intersection:
 
 
 def _surfaces(a: Surface, b: Surface, tolerance: float) -> Intersection:
-    """Two surfaces: by closed form where there is one."""
-    from patchwright.ssi.closed_forms import clip, closed_form
+    """Two surfaces: by closed form where there is one, also of analytic surfaces in NURBS form."""
+    from patchwright.ssi.closed_forms import clip
+    from patchwright.ssi.recognised import by_closed_form
 
-    exact = closed_form(a, b, tolerance)
+    exact = by_closed_form(a, b, tolerance)
     if exact is not None:
         return exact
     from patchwright.ssi.surface_surface import intersect_surfaces
