@@ -16,6 +16,7 @@ from patchwright.models.analytic import Cylinder, Plane, Sphere
 from patchwright.models.errors import ParameterError
 from patchwright.models.surface import Surface
 from patchwright.models.triangulation import Triangulation
+from patchwright.ssi.chained import chained
 from patchwright.ssi.embedded import is_embedded
 from patchwright.ssi.intersection import Intersection, Unresolved
 from patchwright.ssi.operands import Input, Operand, meeting, operands
@@ -23,6 +24,7 @@ from patchwright.ssi.trimmed import trimmed
 from patchwright.ssi.triple_points import triple_points
 
 SHARE = 1e-10  # of the smaller surface's size: the tolerance nobody gave
+MEETING = 1e-8  # of the curves' extent: ends nearer than this are one place
 ONCE = (Plane, Cylinder, Sphere)  # surfaces that never meet themselves, seams apart
 Progress = Callable[[str, float], None]
 
@@ -115,7 +117,9 @@ def _surfaces(a: Surface, b: Surface, tolerance: float) -> Intersection:
     from patchwright.ssi.surface_surface import intersect_surfaces
 
     a, b = clip(a, b)
-    return intersect_surfaces(a, b, tolerance)
+    found = intersect_surfaces(a, b, tolerance)
+    extent = max((float(np.ptp(c.points, axis=0).max()) for c in found.curves), default=0.0)
+    return chained(found, MEETING * extent + 10.0 * tolerance)
 
 
 def _self(item: Operand) -> Intersection:

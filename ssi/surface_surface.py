@@ -34,6 +34,7 @@ BUDGET = 300_000  # pairs of boxes judged; 10 to 20 microseconds each
 SMALL = 1e-8  # of the size: boxes are not split below
 FIT = 1e-11  # of the size: residual asked of a piece of a curve
 WORST = 1e-6  # of the size: a curve that is further off is not returned but reported
+WILD = 1e6  # sizes: a longer arc is a step that went astray near a singular point
 LONGEST = 0.25  # of the size: longest step
 
 
@@ -96,6 +97,9 @@ class _Work:
         self._check_ends(branches)
         curves = []
         for arc in branches:
+            if not self._sound(arc):
+                self._drop(arc)
+                continue
             curve = fitted(arc, self.a, self.b)
             if curve.residual <= max(WORST * self.frame.size, 16.0 * self.tol * self.frame.size):
                 curves.append(curve)
@@ -115,6 +119,11 @@ class _Work:
                 rows = self._unexplained(rows, balls, branches)
             self._leave(rows, why)
         return Intersection(tuple(curves), tuple(contacts), (), tuple(self.unresolved))
+
+    def _sound(self, arc: Arc) -> bool:
+        """Whether an arc's numbers are finite and its length one that surfaces of this size can hold."""
+        finite = bool(np.isfinite(arc.jets).all() and np.isfinite(arc.lengths).all())
+        return finite and float(arc.lengths.sum()) < WILD * self.frame.size
 
     def _arcs(self, balls: list[Ball]) -> list[Arc]:
         from patchwright.ssi._subdivision_kernel import TRANSVERSAL

@@ -14,6 +14,7 @@ import numpy as np
 from patchwright.models.arrays import Array, BoolArray
 from patchwright.models.nurbs_curve import NurbsCurve
 from patchwright.models.surface import Surface
+from patchwright.ssi.chained import appended
 from patchwright.ssi.intersection import Contact, Intersection, IntersectionCurve
 from patchwright.ssi.operands import Loops
 
@@ -62,7 +63,8 @@ def _cut(
     runs = [(ends[i], ends[i + 1]) for i in np.flatnonzero(kept)]
     pieces = [_restricted(curve, t0, t1) for t0, t1 in runs]
     if curve.closed and len(pieces) > 1 and kept[0] and kept[-1]:
-        pieces = [_joined(pieces[-1], pieces[0]), *pieces[1:-1]]
+        # parted only where the loop happens to begin
+        pieces = [appended(pieces[-1], pieces[0]), *pieces[1:-1]]
     return pieces
 
 
@@ -73,38 +75,6 @@ def _restricted(curve: IntersectionCurve, t0: float, t1: float) -> IntersectionC
     inner = curve.points[(at > t0) & (at < t1)]
     points = np.concatenate([curve.curve(np.array([t0])), inner, curve.curve(np.array([t1]))])
     return replace(curve, curve=part, uv_a=uv_a, uv_b=uv_b, points=points, closed=False)
-
-
-def _joined(first: IntersectionCurve, second: IntersectionCurve) -> IntersectionCurve:
-    """Two pieces of a loop that were parted only where the loop happens to begin."""
-
-    def both(a: NurbsCurve | None, b: NurbsCurve | None) -> NurbsCurve | None:
-        return None if a is None or b is None else _appended(a, b)
-
-    points = np.concatenate([first.points, second.points[1:]])
-    return replace(
-        first,
-        curve=_appended(first.curve, second.curve),
-        uv_a=both(first.uv_a, second.uv_a),
-        uv_b=both(first.uv_b, second.uv_b),
-        points=points,
-    )
-
-
-def _appended(a: NurbsCurve, b: NurbsCurve) -> NurbsCurve:
-    """One curve through a and on through b, both of one degree; across a parameter seam it jumps."""
-    a, b = a.clamped(), b.clamped()
-    p = a.degree
-    shift = a.domain[1] - b.domain[0]
-    wa = np.ones(len(a.control_points)) if a.weights is None else a.weights
-    wb = np.ones(len(b.control_points)) if b.weights is None else b.weights
-    wb = wb * (wa[-1] / wb[0])
-    meets = np.allclose(a.control_points[-1], b.control_points[0], rtol=1e-9, atol=1e-12)
-    skip = 1 if meets else 0
-    knots = np.concatenate([a.knots[: -1 if meets else None], b.knots[p + 1 :] + shift])
-    points = np.concatenate([a.control_points, b.control_points[skip:]])
-    rational = a.weights is not None or b.weights is not None
-    return NurbsCurve(p, knots, points, np.concatenate([wa, wb[skip:]]) if rational else None)
 
 
 def _polyline(curve: NurbsCurve) -> tuple[Array, Array]:
