@@ -11,16 +11,19 @@ from typing import Any
 
 import numpy as np
 
+from patchwright.models.analytic import Torus
 from patchwright.models.arrays import Array
 from patchwright.models.assembly import Assembly
 from patchwright.models.io import read, read_grid
 from patchwright.models.io.curves import write_curves
 from patchwright.models.io.registry import format_of
+from patchwright.models.nurbs_surface import NurbsSurface
 from patchwright.models.structured_grid import StructuredGrid
 from patchwright.models.surface import Surface
 from patchwright.models.triangulation import Triangulation
 from patchwright.pipelines.progress import Terminal
 from patchwright.pipelines.scenes import Scene, draw_scenes
+from patchwright.pipelines.warm import announce_sections
 from patchwright.ssi import Intersection, IntersectionCurve, intersect
 from patchwright.ssi.operands import Operand, operands
 
@@ -56,6 +59,8 @@ def run_intersect(
             report(f"reading {path.name}", k / len(sources))
             inputs.append(_input(path))
     unit = next((i.unit for i in inputs if isinstance(i, Assembly) and i.unit != "unknown"), "unknown")
+    if any(isinstance(item.thing, NurbsSurface | Torus) for item in operands(inputs)):
+        announce_sections(terminal)
     begin = time.perf_counter()
     with terminal.stage("intersect") as report:
         found = intersect(inputs[0], *inputs[1:], tolerance=tolerance, progress=report)

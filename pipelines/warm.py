@@ -21,12 +21,13 @@ if TYPE_CHECKING:
     from patchwright.models.triangulation import Triangulation
 
 WITNESS = "patchwright.repair._remesh_kernel"  # compiled late in every repair of a triangulation
+SECTIONS = "patchwright.ssi._subdivision_kernel"  # compiled by every intersection of free-form surfaces
 _started = False  # in this process
 
 
-def is_cold() -> bool:
-    """Whether the kernels have not been compiled on this machine since their source changed."""
-    spec = find_spec(WITNESS)
+def is_cold(witness: str = WITNESS) -> bool:
+    """Whether the kernels of a module have not been compiled on this machine since their source changed."""
+    spec = find_spec(witness)
     if spec is None or spec.origin is None:
         return False
     source = Path(spec.origin)
@@ -48,6 +49,13 @@ def start(terminal: Terminal) -> None:
     command = [sys.executable, "-m", "patchwright.pipelines.warm"]
     nothing = subprocess.DEVNULL
     subprocess.Popen(command, stdin=nothing, stdout=nothing, stderr=nothing)
+
+
+def announce_sections(terminal: Terminal) -> None:
+    """On a cold machine: say that intersecting surfaces compiles its kernels first."""
+    if is_cold(SECTIONS):
+        spare_collections()
+        terminal.line("  compiling kernels for this machine: one to two minutes for surfaces, this once")
 
 
 def spare_collections() -> None:
