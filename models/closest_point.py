@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from patchwright.models.arrays import Array, IntArray
 from patchwright.models.errors import ParameterError
-from patchwright.models.knots import locked
+from patchwright.models.knots import between, locked
 from patchwright.models.nurbs_curve import NurbsCurve
 from patchwright.models.nurbs_surface import NurbsSurface
 
@@ -236,8 +236,7 @@ def _samples(ts: Array, count: int) -> Array:
     """Parameters inside every span, `count` each, and both ends of the domain."""
     if count < 1:
         raise ParameterError(f"samples must be at least 1 per span, got {count}")
-    places = (np.arange(count) + 0.5) / count
-    return np.concatenate((ts[:1], (ts[:-1, None] + np.diff(ts)[:, None] * places).ravel(), ts[-1:]))
+    return np.concatenate((ts[:1], between(ts, count), ts[-1:]))
 
 
 def _kept(rows: Array, size: float) -> npt.NDArray[np.bool_]:

@@ -64,6 +64,18 @@ def inside(domain: tuple[float, float], t: npt.ArrayLike, name: str = "u") -> Ar
     return np.clip(values, low, high)
 
 
+def between(breaks: Array, count: int) -> Array:
+    """`count` parameters inside every span, in the middles of its equal parts."""
+    steps = (np.arange(count) + 0.5) / count
+    return np.asarray((breaks[:-1, None] + np.diff(breaks)[:, None] * steps).ravel())
+
+
+def divided(breaks: Array, count: int) -> Array:
+    """Every span cut into `count` equal parts: all their ends, the breaks among them."""
+    steps = np.arange(count) / count
+    return np.append((breaks[:-1, None] + np.diff(breaks)[:, None] * steps).ravel(), breaks[-1])
+
+
 def locked(values: Array) -> Array:
     """A read-only, contiguous, float64 view or copy: the one kind of array the kernels are compiled for."""
     array = np.ascontiguousarray(values, dtype=np.float64)

@@ -17,6 +17,7 @@ from patchwright.models.assembly import Assembly
 from patchwright.models.io import read, read_grid
 from patchwright.models.io.curves import write_curves
 from patchwright.models.io.registry import format_of
+from patchwright.models.knots import between, divided
 from patchwright.models.nurbs_surface import NurbsSurface
 from patchwright.models.structured_grid import StructuredGrid
 from patchwright.models.surface import Surface
@@ -59,12 +60,13 @@ def run_intersect(
             report(f"reading {path.name}", k / len(sources))
             inputs.append(_input(path))
     unit = next((i.unit for i in inputs if isinstance(i, Assembly) and i.unit != "unknown"), "unknown")
-    if any(isinstance(item.thing, NurbsSurface | Torus) for item in operands(inputs)):
+    items = operands(inputs)
+    if any(isinstance(item.thing, NurbsSurface | Torus) for item in items):
         announce_sections(terminal)
     begin = time.perf_counter()
     with terminal.stage("intersect") as report:
         found = intersect(inputs[0], *inputs[1:], tolerance=tolerance, progress=report)
-    result = Sections(found, operands(inputs), time.perf_counter() - begin, ())
+    result = Sections(found, items, time.perf_counter() - begin, ())
     if output is None:
         return result
     with terminal.stage("write") as report:
@@ -104,17 +106,12 @@ def polyline(curve: IntersectionCurve) -> Array:
     """(n, 3) points along a curve, its knots among them."""
     if curve.uv_a is None and curve.uv_b is None:
         return curve.points
-    breaks = curve.curve.breaks
-    share = np.arange(CHORDS) / CHORDS
-    t = np.append((breaks[:-1, None] + share * np.diff(breaks)[:, None]).reshape(-1), breaks[-1])
-    return curve.curve(t)
+    return curve.curve(divided(curve.curve.breaks, CHORDS))
 
 
 def residuals(curve: IntersectionCurve, items: Sequence[Operand]) -> tuple[float | None, float | None]:
     """Largest distance between the curve and its image on either surface; None on a mesh."""
-    breaks = curve.curve.breaks
-    share = (np.arange(PER_SPAN) + 0.5) / PER_SPAN
-    t = (breaks[:-1, None] + share * np.diff(breaks)[:, None]).reshape(-1)
+    t = between(curve.curve.breaks, PER_SPAN)
     points = curve.curve(t)
     out: list[float | None] = []
     for uv, operand in zip((curve.uv_a, curve.uv_b), curve.surfaces, strict=True):

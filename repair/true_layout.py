@@ -13,6 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from patchwright.models.arrays import Array, BoolArray
+from patchwright.models.knots import divided
 from patchwright.models.nurbs_curve import NurbsCurve
 from patchwright.repair.quad_layout import QuadLayout
 from patchwright.repair.true_ground import TrueGround
@@ -59,7 +60,7 @@ def onto_curves(points: Array, curves: tuple[NurbsCurve, ...]) -> Array:
 
     from patchwright.models.closest_point import closest_on_curve
 
-    parameters = [_spread(curve) for curve in curves]
+    parameters = [divided(curve.breaks, CHORDS) for curve in curves]
     owner = np.repeat(np.arange(len(curves)), [len(t) for t in parameters])
     t = np.concatenate(parameters)
     samples = np.concatenate([curve(at) for curve, at in zip(curves, parameters, strict=True)])
@@ -69,12 +70,6 @@ def onto_curves(points: Array, curves: tuple[NurbsCurve, ...]) -> Array:
         some = np.flatnonzero(owner[nearest] == number)
         out[some] = closest_on_curve(curves[number], points[some], start=t[nearest[some]]).points
     return out
-
-
-def _spread(curve: NurbsCurve) -> Array:
-    breaks = curve.breaks
-    share = np.arange(CHORDS) / CHORDS
-    return np.concatenate([(breaks[:-1, None] + np.diff(breaks)[:, None] * share).ravel(), breaks[-1:]])
 
 
 def _within(points: Array, moved: Array, reach: float) -> Array:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from patchwright.models.arrays import Array
+from patchwright.models.knots import between
 from patchwright.models.nurbs_curve import NurbsCurve
 from patchwright.models.surface import Surface
 from patchwright.ssi.arcs import Arc
@@ -60,8 +61,7 @@ def fitted(arc: Arc, a: Surface, b: Surface) -> IntersectionCurve:
 
 def measured(curve: NurbsCurve, uv_a: NurbsCurve, uv_b: NurbsCurve, a: Surface, b: Surface) -> float:
     """The largest distance between a curve, uv_a on a and uv_b on b on samples inside every piece."""
-    s = curve.breaks
-    t = (s[:-1, None] + np.diff(s)[:, None] * (np.arange(SAMPLES) + 0.5) / SAMPLES).ravel()
+    t = between(curve.breaks, SAMPLES)
     x = curve(t)
     on = []
     for uv, surface in ((uv_a, a), (uv_b, b)):

@@ -21,6 +21,7 @@ import numpy.typing as npt
 from patchwright.models import Cone, Cylinder, NurbsSurface, Plane, Sphere, Torus
 from patchwright.models.arrays import Array
 from patchwright.models.errors import ParameterError
+from patchwright.models.knots import between
 from patchwright.models.surface import Surface
 from patchwright.ssi.closed_forms.inversion import TURN, Analytic, inverted, place, side
 
@@ -69,7 +70,7 @@ def recognise(surface: Surface, tolerance: float) -> Recognised | None:
     flat = _plane(surface, tolerance)
     if flat is not None:
         return flat
-    us, vs = (_between(ts, SAMPLES) for ts in surface.breaks)
+    us, vs = (between(ts, SAMPLES) for ts in surface.breaks)
     points = surface.grid(us, vs).reshape(-1, 3)
     along_u, along_v = (surface.grid(us, vs, nu).reshape(-1, 3) for nu in ((1, 0), (0, 1)))
     normals = np.cross(along_u, along_v)
@@ -87,11 +88,6 @@ def recognise(surface: Surface, tolerance: float) -> Recognised | None:
         if out is not None:
             return out
     return None
-
-
-def _between(ts: Array, count: int) -> Array:
-    steps = (np.arange(count) + 0.5) / count
-    return np.asarray((ts[:-1, None] + np.diff(ts)[:, None] * steps).ravel())
 
 
 def _plane(surface: NurbsSurface, tolerance: float) -> Recognised | None:
@@ -186,7 +182,7 @@ def _distance(surface: Analytic, points: Array) -> Array:
 
 
 def _checked(native: NurbsSurface, found: Analytic, tolerance: float) -> Recognised | None:
-    us, vs = (np.append(_between(ts, 4 * SAMPLES), ts) for ts in native.breaks)
+    us, vs = (np.append(between(ts, 4 * SAMPLES), ts) for ts in native.breaks)
     deviation = float(_distance(found, native.grid(us, vs).reshape(-1, 3)).max())
     if deviation > tolerance:
         return None
@@ -277,7 +273,7 @@ def _placed(native: NurbsSurface, found: Analytic) -> list[Analytic]:
 
 
 def _grid(native: NurbsSurface) -> Array:
-    us, vs = (np.unique(np.concatenate((_between(ts, 2 * SAMPLES), ts))) for ts in native.breaks)
+    us, vs = (np.unique(np.concatenate((between(ts, 2 * SAMPLES), ts))) for ts in native.breaks)
     return native.grid(us, vs)
 
 

@@ -19,6 +19,7 @@ import numpy as np
 
 from patchwright.models import NurbsCurve, NurbsSurface
 from patchwright.models.arrays import Array, BoolArray
+from patchwright.models.knots import between
 from patchwright.models.surface import Surface
 from patchwright.ssi.closed_forms.closed_form import KINDS, closed_form
 from patchwright.ssi.closed_forms.inversion import Analytic
@@ -149,8 +150,7 @@ def _at(thing: Analytic | Recognised, point: Array, known: tuple[float, float] |
 def _residual(curve: NurbsCurve, uvs: tuple[NurbsCurve, NurbsCurve], surfaces: tuple[Surface, Surface]) -> float:
     """The largest distance between the curve and both surfaces at their parameters, on samples inside all pieces."""
     breaks = np.unique(np.concatenate([c.breaks for c in (curve, *uvs)]))
-    steps = (np.arange(DENSER) + 0.5) / DENSER
-    t = (breaks[:-1, None] + np.diff(breaks)[:, None] * steps).ravel()
+    t = between(breaks, DENSER)
     x = curve(t)
     on = []
     for uv, surface in zip(uvs, surfaces, strict=True):

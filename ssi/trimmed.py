@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from patchwright.models.arrays import Array, BoolArray
+from patchwright.models.knots import divided
 from patchwright.models.nurbs_curve import NurbsCurve
 from patchwright.models.surface import Surface
 from patchwright.ssi.chained import appended
@@ -79,9 +80,7 @@ def _restricted(curve: IntersectionCurve, t0: float, t1: float) -> IntersectionC
 
 def _polyline(curve: NurbsCurve) -> tuple[Array, Array]:
     """Points of a curve, knots included, and their parameters."""
-    breaks = curve.breaks
-    share = np.arange(PER_SPAN) / PER_SPAN
-    t = np.append((breaks[:-1, None] + share * np.diff(breaks)[:, None]).reshape(-1), breaks[-1])
+    t = divided(curve.breaks, PER_SPAN)
     return curve(t), t
 
 

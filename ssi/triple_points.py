@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from patchwright.models.arrays import Array
+from patchwright.models.knots import divided
 from patchwright.models.tree import Tree
 from patchwright.models.triangulation import Triangulation
 from patchwright.ssi.intersection import Contact, IntersectionCurve
@@ -50,9 +51,7 @@ def _chords(curves: Sequence[IntersectionCurve]) -> tuple[Array, ...]:
     """Ends, curve and parameter range of chords of all curves."""
     rows: list[tuple[Array, ...]] = []
     for k, one in enumerate(curves):
-        breaks = one.curve.breaks
-        share = np.arange(CHORDS) / CHORDS
-        t = np.append((breaks[:-1, None] + share * np.diff(breaks)[:, None]).reshape(-1), breaks[-1])
+        t = divided(one.curve.breaks, CHORDS)
         p = one.curve(t)
         rows.append((p[:-1], p[1:], np.full(len(t) - 1, k), t[:-1], t[1:]))
     return tuple(np.concatenate(column) for column in zip(*rows, strict=True))

@@ -19,6 +19,7 @@ from patchwright.models.cad.connectivity import is_point
 from patchwright.models.cad.seams import edge_deviation, edge_uses
 from patchwright.models.cad.sewing import surface_difference
 from patchwright.models.errors import GeometryError, ParameterError
+from patchwright.models.knots import divided
 from patchwright.models.nurbs_curve import NurbsCurve
 from patchwright.models.topology import EdgeUse, Topology
 from patchwright.models.triangulation import Triangulation
@@ -177,9 +178,7 @@ def _loop(topology: Topology, steps: list[tuple[int, bool]], closed: bool, faces
 
 def _along(curve: NurbsCurve, reverse: bool) -> Array:
     """(k, 3) points on the curve, both ends included."""
-    breaks = curve.breaks
-    share = np.arange(PROBES) / PROBES
-    t = np.concatenate([(breaks[:-1, None] + np.diff(breaks)[:, None] * share).ravel(), breaks[-1:]])
+    t = divided(curve.breaks, PROBES)
     return curve(t[::-1] if reverse else t)
 
 
