@@ -8,6 +8,7 @@ import numpy as np
 
 from patchwright.models.adjacency import Adjacency
 from patchwright.models.arrays import Array, BoolArray, IntArray
+from patchwright.models.errors import GeometryError
 from patchwright.models.triangulation import Triangulation
 from patchwright.repair.bridge import borders_of
 from patchwright.repair.clean import split_non_manifold
@@ -15,7 +16,7 @@ from patchwright.repair.crossings import CROSSING, crossing_pairs
 from patchwright.repair.mend_gaps import fill
 from patchwright.repair.mended import BRIDGED, STRAY_SHARE, Action, Problem, Work, known, middle
 from patchwright.repair.orient import orient
-from patchwright.repair.outer_hull import outer_hull
+from patchwright.repair.outer_hull import outer_hull, untangled
 from patchwright.repair.untangle import inner_patches, winding
 
 SHEET = 0.4  # a body whose openings take more of its area than this is an open sheet, not a body with openings
@@ -87,6 +88,24 @@ def _untangle(work: Work, is_cap: BoolArray, body: IntArray) -> tuple[BoolArray,
     pairs = pairs[body[pairs[:, 0]] == body[pairs[:, 1]]]
     if not len(pairs):
         return is_cap, body
+    tangled = np.unique(body[pairs])
+    try:
+        hull = untangled(work.now, body, tangled)
+    except GeometryError:
+        return _without_inner_patches(work, is_cap, body, pairs)
+    names = ", ".join(work.names(known(work.source[np.isin(body, tangled)]))) or "its own body"
+    for piece in hull.inside:
+        real = piece.triangles[~is_cap[piece.triangles]]
+        work.drop("inner surface", f"it lies inside {names}", real, piece.area)
+    work.follow(hull.triangulation, hull.parents, hull.cut)
+    work.now = split_non_manifold(work.now)
+    return is_cap[hull.parents], np.asarray(Adjacency.of(work.now).components())
+
+
+def _without_inner_patches(
+    work: Work, is_cap: BoolArray, body: IntArray, pairs: IntArray
+) -> tuple[BoolArray, IntArray]:
+    """The same where the cuts are too near each other: whole patches go, and caps close what that opens."""
     inner = inner_patches(work.now, body, pairs, 10.0 * work.tolerance.gap)
     if not inner.any():
         return is_cap, body

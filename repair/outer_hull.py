@@ -2,11 +2,13 @@
 
 The union is exact (manifold3d, in float64): vertices of the input keep their coordinates to the last bit, triangles
 that no other body crosses stay as they are, and every piece knows the triangle it was cut from. Bodies that touch no
-other are handed through untouched. A body inside another that came facing inward is a cavity and stays.
+other are handed through untouched. A body inside another that came facing inward is a cavity and stays. A body that
+passes through itself is no input for that; it is cut along its own intersection curves first (`ssi.outer_hull`).
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -15,6 +17,7 @@ import numpy as np
 from patchwright.models.arrays import Array, BoolArray, IntArray
 from patchwright.models.triangulation import Triangulation
 from patchwright.repair.untangle import winding
+from patchwright.ssi.outer_hull import outer_pieces
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,33 +51,67 @@ class Hull:
     failed: tuple[str, ...]
 
 
+Pieces = tuple[Array, IntArray, IntArray]
+"""Points (n, 3), triangles (m, 3) and the input triangle each is or was cut from."""
+
+
 def outer_hull(triangulation: Triangulation, body: IntArray, inward: BoolArray | None = None) -> Hull:
     """Unite the closed, outward bodies; `body` (m,) labels them 0..b-1, `inward` (b,) those that came facing inward."""
-    count = len(triangulation)
     bodies = int(body.max(initial=-1)) + 1
     inward = np.zeros(bodies, dtype=np.bool_) if inward is None else inward
     groups = _groups(triangulation, body, bodies)
+    made: list[Pieces | None] = []
+    failed: list[str] = []
+    for group in groups:
+        united = None
+        if len(group) > 1:
+            try:
+                united = _unite(triangulation, body, group, inward)
+            except _Refused as refusal:
+                failed.append(str(refusal))
+        made.append(united)
+    return _joined(triangulation, body, groups, made, tuple(failed))
+
+
+def untangled(triangulation: Triangulation, body: IntArray, tangled: IntArray) -> Hull:
+    """Each of the closed, outward bodies named in `tangled` cut where it passes through itself, without what is inside.
+
+    Raises
+    ------
+    GeometryError : sheets so near each other that the cuts or the sides cannot be told.
+    """
+    groups = [np.array([b]) for b in range(int(body.max(initial=-1)) + 1)]
+    made: list[Pieces | None] = [None] * len(groups)
+    for b in tangled.tolist():
+        own = np.flatnonzero(body == b)
+        hull, parent = outer_pieces(triangulation.take(own))
+        made[b] = hull.vertices, hull.triangles, own[parent]
+    return _joined(triangulation, body, groups, made, ())
+
+
+def _joined(
+    triangulation: Triangulation,
+    body: IntArray,
+    groups: Sequence[IntArray],
+    made: Sequence[Pieces | None],
+    failed: tuple[str, ...],
+) -> Hull:
+    """The pieces made of some groups of bodies beside the bodies of the others as they came."""
+    count = len(triangulation)
     vertices = [triangulation.vertices]
     base = len(triangulation.vertices)
     rows: list[IntArray] = []
     parents: list[IntArray] = []
     cuts: list[BoolArray] = []
     inside: list[Inside] = []
-    failed: list[str] = []
-    for group in groups:
+    for group, pieces in zip(groups, made, strict=True):
         own = np.flatnonzero(np.isin(body, group))
-        made = None
-        if len(group) > 1:
-            try:
-                made = _unite(triangulation, body, group, inward)
-            except _Refused as refusal:
-                failed.append(str(refusal))
-        if made is None:
+        if pieces is None:
             rows.append(triangulation.triangles[own])
             parents.append(own)
             cuts.append(np.zeros(len(own), dtype=np.bool_))
             continue
-        points, triangles, parent = made
+        points, triangles, parent = pieces
         new_rows, new_points, cut = _rejoin(triangulation, points, triangles, parent, base)
         vertices.append(new_points)
         base += len(new_points)
@@ -94,7 +131,7 @@ def outer_hull(triangulation: Triangulation, body: IntArray, inward: BoolArray |
     )
     cut = np.concatenate(cuts)[order] if cuts else np.zeros(0, dtype=np.bool_)
     assert count == 0 or len(result)
-    return Hull(result, parent, cut, tuple(inside), tuple(failed))
+    return Hull(result, parent, cut, tuple(inside), failed)
 
 
 class _Refused(Exception):
@@ -118,10 +155,8 @@ def _groups(triangulation: Triangulation, body: IntArray, bodies: int) -> list[I
     return [np.flatnonzero(label == k) for k in range(int(label.max()) + 1)]
 
 
-def _unite(
-    triangulation: Triangulation, body: IntArray, group: IntArray, inward: BoolArray
-) -> tuple[Array, IntArray, IntArray]:
-    """Points, triangles and parents of the union of some bodies."""
+def _unite(triangulation: Triangulation, body: IntArray, group: IntArray, inward: BoolArray) -> Pieces:
+    """The union of some bodies."""
     import manifold3d
 
     solids: list[Any] = []

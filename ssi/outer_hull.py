@@ -36,14 +36,24 @@ def outer_hull(meshes: Sequence[Triangulation]) -> Triangulation:
     ParameterError : the meshes together are not closed: some edge is not run as often one way as the other.
     GeometryError : sheets so near each other that the side of one the other lies on cannot be told.
     """
-    whole = _welded(concatenate(list(meshes)))
+    return outer_pieces(concatenate(list(meshes)))[0]
+
+
+def outer_pieces(whole: Triangulation) -> tuple[Triangulation, IntArray]:
+    """The outer hull of all bodies of one mesh, and (m,) int64 the triangle each of its pieces is or was cut from.
+
+    Raises
+    ------
+    as `outer_hull`
+    """
+    whole, number = _welded(whole)
     gaps = unbalanced_edges(whole.triangles, len(whole.vertices))
     if gaps:
         raise ParameterError(
             f"{gaps} edges are not closed, an outer hull needs closed and consistently oriented meshes"
         )
     if not len(whole):
-        return whole
+        return whole, number
     found = mesh_intersection(whole)
     cut = cut_triangles(whole, found)
     patch = _patches(cut)
@@ -61,7 +71,7 @@ def outer_hull(meshes: Sequence[Triangulation]) -> Triangulation:
         raise GeometryError(
             f"the outer hull has {gaps} open edges: some of the meshes are within round-off of each other"
         )
-    return hull
+    return hull, number[cut.parents[keep]]
 
 
 def unbalanced_edges(triangles: IntArray, vertices: int) -> int:
@@ -74,8 +84,8 @@ def unbalanced_edges(triangles: IntArray, vertices: int) -> int:
     return int(np.count_nonzero(np.add.reduceat(way, first))) if len(first) else 0
 
 
-def _welded(mesh: Triangulation) -> Triangulation:
-    """Equal coordinates as one vertex, without triangles that have one vertex twice."""
+def _welded(mesh: Triangulation) -> tuple[Triangulation, IntArray]:
+    """Equal coordinates as one vertex, without triangles that have one vertex twice; and which triangles are left."""
     order = np.lexsort(mesh.vertices.T[::-1])
     rows = mesh.vertices[order]
     fresh = np.ones(len(rows), dtype=np.bool_)
@@ -86,7 +96,7 @@ def _welded(mesh: Triangulation) -> Triangulation:
     triangles = number[mesh.triangles]
     good = (triangles != np.roll(triangles, 1, axis=1)).all(axis=1)
     tags = None if mesh.tags is None else mesh.tags[good]
-    return Triangulation(mesh.vertices, triangles[good], tags=tags, tag_names=mesh.tag_names)
+    return Triangulation(mesh.vertices, triangles[good], tags=tags, tag_names=mesh.tag_names), np.flatnonzero(good)
 
 
 def _patches(cut: CutTriangles) -> IntArray:

@@ -148,7 +148,7 @@ def test_a_body_that_runs_through_itself_is_untangled() -> None:
     assert (shapes.edge_uses(tangled) == 2).all()
     result = mended(tangled, "keep")
     assert result.closed
-    assert result.triangulation.volume == pytest.approx(union, rel=1e-2)
+    assert result.triangulation.volume == pytest.approx(union, rel=1e-12)
 
 
 @pytest.mark.parametrize("count", [0, 1])
