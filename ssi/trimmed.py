@@ -1,7 +1,8 @@
 """Curves of two surfaces cut back to the faces' trims.
 
 A curve ends where its (u, v) image crosses a trim loop: crossings of the polylines seed Newton's method on both curves.
-Pieces are kept when their middle lies inside the loops (even-odd rule) or on them.
+Pieces are kept when their middle lies inside the loops (even-odd rule) or on them. Limit: a curve that runs along a
+loop and leaves it smoothly is cut where the polylines cross, not where it leaves. Overlaps are not cut.
 """
 
 from __future__ import annotations
@@ -21,47 +22,50 @@ from patchwright.ssi.operands import Loops
 
 PER_SPAN = 24  # chords of a polyline in each knot span
 NEWTON = 12
+ON = 1e-8  # of the loops' extent in space: what is nearer than this to a loop lies on it
 
 
 def trimmed(found: Intersection, surface: Surface, loops: Loops | None, side: int) -> Intersection:
-    """What of an intersection lies on a face.
+    """What of an intersection lies on a face, its border included.
 
     Parameters
     ----------
     surface, loops : the face; None as loops keeps everything
     side : 0 when the face is the first of the two surfaces, 1 when it is the second
     """
-    if loops is None:
+    if loops is None or not (found.curves or found.points):
         return found
-    border = [_moved(curve, shift) for loop in loops for curve in loop for shift in _shifts(surface)]
-    polygons = [np.concatenate([_polyline(c)[0][:-1] for c in loop]) for loop in loops]
-    curves = tuple(piece for curve in found.curves for piece in _cut(curve, surface, border, polygons, side))
-    points = tuple(p for p in found.points if _keeps(p, surface, polygons, side))
+    moved = [[[_moved(curve, shift) for curve in loop] for loop in loops] for shift in _shifts(surface)]
+    curves = tuple(piece for curve in found.curves for piece in _cut(curve, surface, moved, side))
+    points = tuple(p for p in found.points if _keeps(p, surface, moved, side))
     return replace(found, curves=curves, points=points)
 
 
-def _keeps(contact: Contact, surface: Surface, polygons: Sequence[Array], side: int) -> bool:
+Moved = Sequence[Sequence[Sequence[NurbsCurve]]]  # loops of curves, once for every period of the surface
+
+
+def _keeps(contact: Contact, surface: Surface, moved: Moved, side: int) -> bool:
     uv = contact.uv_a if side == 0 else contact.uv_b
-    return uv is None or bool(_inside(np.array([uv]), surface, polygons)[0])
+    return uv is None or bool(_inside(np.array([uv]), surface, moved)[0])
 
 
-def _cut(
-    curve: IntersectionCurve, surface: Surface, border: Sequence[NurbsCurve], polygons: Sequence[Array], side: int
-) -> list[IntersectionCurve]:
-    """The pieces of one curve inside the loops."""
+def _cut(curve: IntersectionCurve, surface: Surface, moved: Moved, side: int) -> list[IntersectionCurve]:
+    """The pieces of one curve inside the loops or on them."""
     uv = curve.uv_a if side == 0 else curve.uv_b
     if uv is None:
         return [curve]
     start, end = curve.curve.domain
     least = 1e-9 * (end - start)
+    border = [c for loops in moved for loop in loops for c in loop]
     cuts = np.unique(np.concatenate([_crossings(uv, other) for other in border] or [np.zeros(0)]))
     cuts = cuts[(cuts > start + least) & (cuts < end - least)]
     cuts = cuts[np.diff(cuts, prepend=start) > least]
     ends = np.concatenate([[start], cuts, [end]])
-    kept = _inside(uv(0.5 * (ends[1:] + ends[:-1])), surface, polygons)
+    kept = _inside(uv(0.5 * (ends[1:] + ends[:-1])), surface, moved)
     if kept.all():
         return [curve]
-    runs = [(ends[i], ends[i + 1]) for i in np.flatnonzero(kept)]
+    change = np.diff(np.concatenate([[False], kept, [False]]).astype(np.int64))
+    runs = [(ends[i], ends[j]) for i, j in zip(np.flatnonzero(change > 0), np.flatnonzero(change < 0), strict=True)]
     pieces = [_restricted(curve, t0, t1) for t0, t1 in runs]
     if curve.closed and len(pieces) > 1 and kept[0] and kept[-1]:
         # parted only where the loop happens to begin
@@ -113,20 +117,45 @@ def _crossings(one: NurbsCurve, other: NurbsCurve) -> Array:
     return np.asarray(good[apart])
 
 
-def _inside(uv: Array, surface: Surface, polygons: Sequence[Array]) -> BoolArray:
-    """(n,) whether points lie inside the loops, in any of their periods."""
+def _inside(uv: Array, surface: Surface, moved: Moved) -> BoolArray:
+    """(n,) whether points lie inside the loops or on them, in any of their periods."""
     out = np.zeros(len(uv), dtype=bool)
-    for shift in _shifts(surface):
+    low, high = np.array(surface.domain).T
+    for loops in moved:
         crossings = np.zeros(len(uv), dtype=np.int64)
-        for polygon in polygons:
-            a = polygon + shift
-            b = np.roll(a, -1, axis=0)
-            spans = (a[None, :, 1] > uv[:, 1:]) != (b[None, :, 1] > uv[:, 1:])
-            with np.errstate(divide="ignore", invalid="ignore"):
-                x = a[:, 0] + (uv[:, 1:] - a[:, 1]) / (b[:, 1] - a[:, 1]) * (b[:, 0] - a[:, 0])
-            crossings += (spans & (x > uv[:, :1])).sum(axis=1)
+        for loop in loops:
+            polygon = []
+            for curve in loop:
+                foot = curve.closest(uv).t
+                out |= _together(uv, curve(foot), surface, low, high)
+                # with the points' feet for vertices the polygon has them on the same side as the curve
+                t = np.unique(np.concatenate([divided(curve.breaks, PER_SPAN), foot]))
+                polygon.append(curve(t)[:-1])
+            crossings += _rays_cut(uv, np.concatenate(polygon))
         out |= crossings % 2 == 1
     return out
+
+
+def _together(uv: Array, other: Array, surface: Surface, low: Array, high: Array) -> BoolArray:
+    """(n,) whether two points of the parameter plane are one point of the surface, within `ON` of its size."""
+    p, q = np.clip(uv, low, high), np.clip(other, low, high)
+    size = float(np.ptp(surface.to_nurbs().control_points.reshape(-1, 3), axis=0).max()) if _finite(surface) else 1.0
+    apart = np.linalg.norm(surface(p[:, 0], p[:, 1]) - surface(q[:, 0], q[:, 1]), axis=1)
+    return np.asarray(apart <= ON * size)
+
+
+def _rays_cut(uv: Array, polygon: Array) -> Array:
+    """(n,) how many edges of a polygon the ray along u from each point cuts."""
+    after = np.roll(polygon, -1, axis=0)
+    spans = (polygon[None, :, 1] > uv[:, 1:]) != (after[None, :, 1] > uv[:, 1:])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = (uv[:, 1:] - polygon[:, 1]) / (after[:, 1] - polygon[:, 1])
+        x = polygon[:, 0] + share * (after[:, 0] - polygon[:, 0])
+    return np.asarray((spans & (x > uv[:, :1])).sum(axis=1))
+
+
+def _finite(surface: Surface) -> bool:
+    return bool(np.isfinite(surface.domain).all())
 
 
 def _shifts(surface: Surface) -> list[Array]:
