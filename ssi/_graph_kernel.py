@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 
-from patchwright.models._compile_kernel import inner, making
+from patchwright.models._compile_kernel import inner
 from patchwright.models.arrays import Array
 from patchwright.ssi._jet_kernel import dot, jets
 from patchwright.ssi.bezier_pieces import MARGIN
@@ -26,7 +26,7 @@ def times(a0: float, a1: float, b0: float, b1: float) -> tuple[float, float]:
     return min(min(p, q), min(r, s)), max(max(p, q), max(r, s))
 
 
-@making
+@inner
 def scaled(k: float, a: Array) -> tuple[float, float]:
     """The multiple of an interval."""
     if k >= 0.0:
@@ -34,7 +34,7 @@ def scaled(k: float, a: Array) -> tuple[float, float]:
     return k * a[1], k * a[0]
 
 
-@making
+@inner
 def rotated(net: Array, frame: Array, c: Array, out: Array) -> None:
     """out[i, j] = homogeneous coordinates along the rows of frame, from the point c."""
     for i in range(net.shape[0]):
@@ -48,7 +48,7 @@ def rotated(net: Array, frame: Array, c: Array, out: Array) -> None:
             out[i, j, 3] = w
 
 
-@making
+@inner
 def derivative_bounds(R: Array, rational: bool, D: Array, S: Array) -> bool:
     """D[0..4, c] = intervals of the derivatives u, v, uu, uv, vv of coordinate c over the net's box."""
     P = R.shape[0]
@@ -132,7 +132,7 @@ def derivative_bounds(R: Array, rational: bool, D: Array, S: Array) -> bool:
     return True
 
 
-@making
+@inner
 def graph_bounds(R: Array, rational: bool, D: Array, S: Array, G: Array, K: Array, H: Array) -> bool:
     """H[0..2] = intervals of z_xx, z_xy, z_yy over the box of the rotated net R; False where it is no graph.
 
@@ -206,7 +206,7 @@ def graph_bounds(R: Array, rational: bool, D: Array, S: Array, G: Array, K: Arra
     return True
 
 
-@making
+@inner
 def foot(
     net: Array, w: Array, at: int, x: float, y: float, F: Array, c: Array, box: Array,
     bu: Array, bv: Array, h: Array, j: Array, g: Array,
@@ -268,7 +268,7 @@ def foot(
     return bool(box[0] - mu <= w[at] <= box[1] + mu and box[2] - mv <= w[at + 1] <= box[3] + mv)
 
 
-@making
+@inner
 def difference(
     A: Array, B: Array, w: Array, x: float, y: float, F: Array, c: Array, box_a: Array, box_b: Array,
     bu: Array, bv: Array, h: Array, ja: Array, jb: Array, ga: Array, gb: Array, f: Array,
@@ -283,7 +283,7 @@ def difference(
     return True
 
 
-@making
+@inner
 def functional_range(R: Array, p: float, q: float) -> tuple[float, float]:
     """The interval of p x + q y over the control points of a rotated net."""
     lo = math.inf
@@ -296,7 +296,7 @@ def functional_range(R: Array, p: float, q: float) -> tuple[float, float]:
     return lo, hi
 
 
-@making
+@inner
 def height_range(R: Array) -> tuple[float, float]:
     """The interval of z over the control points of a rotated net."""
     lo = math.inf

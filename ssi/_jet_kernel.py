@@ -5,20 +5,46 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
-from patchwright.models._compile_kernel import inner, making
+from patchwright.models._compile_kernel import inlined, inner
 from patchwright.models.arrays import Array
 
 
-@making
+FRAME = 8  # rows of the arrays in which the two normals and what follows from them are kept
+
+
+@inlined
+def add_row(h: Array, b0: float, b1: float, b2: float, c: int, r0: float, r1: float, r2: float) -> None:
+    """One row's share of coordinate c of the six derivatives."""
+    h[0, c] += b0 * r0
+    h[1, c] += b1 * r0
+    h[2, c] += b0 * r1
+    h[3, c] += b2 * r0
+    h[4, c] += b1 * r1
+    h[5, c] += b0 * r2
+
+
+@inner
 def bernstein(p: int, t: float, out: Array) -> None:
     """out[k, i] = derivative k (0, 1, 2) of the Bernstein polynomial i of degree p at t."""
+    s = 1.0 - t
+    if p == 3:  # by far the most common
+        out[0, 0] = s * s * s
+        out[0, 1] = 3.0 * s * s * t
+        out[0, 2] = 3.0 * s * t * t
+        out[0, 3] = t * t * t
+        out[1, 0] = -3.0 * s * s
+        out[1, 1] = 3.0 * s * (s - 2.0 * t)
+        out[1, 2] = 3.0 * t * (2.0 * s - t)
+        out[1, 3] = 3.0 * t * t
+        out[2, 0] = 6.0 * s
+        out[2, 1] = 6.0 * (t - 2.0 * s)
+        out[2, 2] = 6.0 * (s - 2.0 * t)
+        out[2, 3] = 6.0 * t
+        return
     # rows of degree p - 2, p - 1 and p are built in turn in out[0]
     for k in range(3):
         for i in range(p + 1):
             out[k, i] = 0.0
-    s = 1.0 - t
     out[0, 0] = 1.0
     for r in range(p + 1):
         if r == p - 2:
@@ -43,7 +69,7 @@ def bernstein(p: int, t: float, out: Array) -> None:
         out[0, r + 1] = keep
 
 
-@making
+@inner
 def jets(net: Array, u: float, v: float, bu: Array, bv: Array, h: Array, out: Array) -> None:
     """out[0..5] = S, S_u, S_v, S_uu, S_uv, S_vv at (u, v); parameters beyond [0, 1] extrapolate."""
     P = net.shape[0]
@@ -57,21 +83,33 @@ def jets(net: Array, u: float, v: float, bu: Array, bv: Array, h: Array, out: Ar
         b0 = bu[0, i]
         b1 = bu[1, i]
         b2 = bu[2, i]
-        for c in range(4):
-            r0 = 0.0
-            r1 = 0.0
-            r2 = 0.0
-            for j in range(Q):
-                x = net[i, j, c]
-                r0 += bv[0, j] * x
-                r1 += bv[1, j] * x
-                r2 += bv[2, j] * x
-            h[0, c] += b0 * r0
-            h[1, c] += b1 * r0
-            h[2, c] += b0 * r1
-            h[3, c] += b2 * r0
-            h[4, c] += b1 * r1
-            h[5, c] += b0 * r2
+        x0 = y0 = z0 = w0 = 0.0  # one row and its derivatives along v, all coordinates at once
+        x1 = y1 = z1 = w1 = 0.0
+        x2 = y2 = z2 = w2 = 0.0
+        for j in range(Q):
+            x = net[i, j, 0]
+            y = net[i, j, 1]
+            z = net[i, j, 2]
+            w = net[i, j, 3]
+            c0 = bv[0, j]
+            c1 = bv[1, j]
+            c2 = bv[2, j]
+            x0 += c0 * x
+            y0 += c0 * y
+            z0 += c0 * z
+            w0 += c0 * w
+            x1 += c1 * x
+            y1 += c1 * y
+            z1 += c1 * z
+            w1 += c1 * w
+            x2 += c2 * x
+            y2 += c2 * y
+            z2 += c2 * z
+            w2 += c2 * w
+        add_row(h, b0, b1, b2, 0, x0, x1, x2)
+        add_row(h, b0, b1, b2, 1, y0, y1, y2)
+        add_row(h, b0, b1, b2, 2, z0, z1, z2)
+        add_row(h, b0, b1, b2, 3, w0, w1, w2)
     w = 1.0 / h[0, 3]
     wu = h[1, 3]
     wv = h[2, 3]
@@ -92,7 +130,7 @@ def dot(a: Array, b: Array) -> float:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@making
+@inner
 def cross(a: Array, b: Array, out: Array) -> None:
     x = a[1] * b[2] - a[2] * b[1]
     y = a[2] * b[0] - a[0] * b[2]
@@ -102,7 +140,7 @@ def cross(a: Array, b: Array, out: Array) -> None:
     out[2] = z
 
 
-@making
+@inner
 def unit(a: Array) -> float:
     """Make a unit in place; its length."""
     length = math.sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
@@ -112,7 +150,7 @@ def unit(a: Array) -> float:
     return length
 
 
-@making
+@inner
 def tangent_coordinates(j: Array, x: Array, out: Array, at: int) -> bool:
     """out[at], out[at + 1] = (a, b) with x = a S_u + b S_v in the least-squares sense; False where singular."""
     e = dot(j[1], j[1])
@@ -128,10 +166,10 @@ def tangent_coordinates(j: Array, x: Array, out: Array, at: int) -> bool:
     return True
 
 
-@making
+@inner
 def normals(ja: Array, jb: Array, frame: Array) -> float:
     """frame[0..4] = n_a, n_b (turned to the side of n_a), the mean n, the difference m and the tangent T; the sine of
-    their angle, or -1 where a normal vanishes."""
+    their angle, or -1 where a normal vanishes. `frame` is (FRAME, 4); rows from 5 on are scratch."""
     cross(ja[1], ja[2], frame[0])
     cross(jb[1], jb[2], frame[1])
     if unit(frame[0]) == 0.0 or unit(frame[1]) == 0.0:
@@ -146,7 +184,7 @@ def normals(ja: Array, jb: Array, frame: Array) -> float:
     return unit(frame[4])
 
 
-@making
+@inner
 def slice_newton(
     A: Array, B: Array, w: Array, T: Array, level: float, steps: int, bu: Array, bv: Array, h: Array,
     ja: Array, jb: Array, frame: Array, tiny: float,
@@ -157,8 +195,8 @@ def slice_newton(
     back to both parameter planes. The two tangent planes enter by the mean and the difference of their normals, which
     keeps the point's error at round-off over the crossing angle. The jets and normals at w are left in ja, jb, frame.
     """
-    x = np.empty(3)
-    d = np.empty(4)
+    x = frame[5]
+    d = frame[6]
     last = math.inf
     for step in range(steps + 1):
         jets(A, w[0], w[1], bu, bv, h, ja)
@@ -226,13 +264,13 @@ def slice_newton(
     return -1.0
 
 
-@making
+@inner
 def curve_jet(ja: Array, jb: Array, frame: Array, sign: float, w: Array, out: Array) -> bool:
     """out (3, 7): x, w = (u, v, s, t) and their first two derivatives by arc length along sign * T."""
-    T = np.empty(3)
+    T = frame[5]
     n = frame[2]
     m = frame[3]
-    r = np.empty(3)
+    r = frame[6]
     for k in range(4):
         out[0, 3 + k] = w[k]
     for c in range(3):

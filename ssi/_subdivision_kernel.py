@@ -13,17 +13,19 @@ import math
 
 import numpy as np
 
-from patchwright.models._compile_kernel import kernel, making
+from patchwright.models._compile_kernel import inner, kernel, making
 from patchwright.models.arrays import Array, IntArray
 from patchwright.ssi._graph_kernel import difference, functional_range, graph_bounds, height_range, rotated
-from patchwright.ssi._jet_kernel import cross, dot, jets, slice_newton, unit
+from patchwright.ssi._jet_kernel import FRAME, cross, dot, jets, slice_newton, unit
 
 SPLIT, EXCLUDED, TRANSVERSAL, TOUCH, BRANCH, TANGENT, OVERLAP, SINGULAR, BUDGET = range(9)
 BOX = 12  # columns of a node's numbers: u0 u1 v0 v1, box (6), size, direction of the next split
+STEP = 1e-7  # Newton's last step: the next would be its square, round-off; what is left is asked for in any case
+VAGUER = 4.0  # times less known a surface has to be to be split though it is the smaller one
 ROW = 20  # columns of a finding: code, piece a, piece b, box a (4), box b (4), u v s t, x y z, gap, spare
 
 
-@making
+@inner
 def describe(net: Array, row: Array) -> None:
     """Box, size and direction of the next split of a node."""
     P = net.shape[0]
@@ -60,28 +62,29 @@ def describe(net: Array, row: Array) -> None:
     row[11] = 0.0 if along >= across else 1.0
 
 
-@making
-def widened(net: Array, M: Array, N: Array, out: Array) -> None:
-    """out = M net N^T: the net of the widened box."""
+@inner
+def widened(net: Array, M: Array, N: Array, row: Array, out: Array) -> None:
+    """out = M net N^T: the net of the widened box; `row` (Q or more, 4) is scratch."""
     P = net.shape[0]
     Q = net.shape[1]
-    row = np.empty((Q, 4))
     for i in range(P):
         for j in range(Q):
             for c in range(4):
-                s = 0.0
-                for k in range(P):
-                    s += M[i, k] * net[k, j, c]
-                row[j, c] = s
+                row[j, c] = 0.0
+            for k in range(P):
+                m = M[i, k]
+                for c in range(4):
+                    row[j, c] += m * net[k, j, c]
         for j in range(Q):
             for c in range(4):
-                s = 0.0
-                for k in range(Q):
-                    s += N[j, k] * row[k, c]
-                out[i, j, c] = s
+                out[i, j, c] = 0.0
+            for k in range(Q):
+                m = N[j, k]
+                for c in range(4):
+                    out[i, j, c] += m * row[k, c]
 
 
-@making
+@inner
 def halves(net: Array, axis: int, left: Array, right: Array) -> None:
     """De Casteljau at 1/2 along an axis."""
     P = net.shape[0]
@@ -108,9 +111,9 @@ def halves(net: Array, axis: int, left: Array, right: Array) -> None:
                     left[i, r, c] = right[i, 0, c]
 
 
-@making
+@inner
 def children(
-    k: int, axis: int, used: int, nets: Array, wide: Array, rows: Array, links: IntArray, M: Array, N: Array
+    k: int, axis: int, used: int, nets: Array, wide: Array, rows: Array, links: IntArray, M: Array, N: Array, line: Array
 ) -> int:  # fmt: skip
     """Make the two children of node k at `used` and `used` + 1; the new number of nodes."""
     halves(nets[k], axis, nets[used], nets[used + 1])
@@ -121,14 +124,14 @@ def children(
         mid = 0.5 * (rows[k, 2 * axis] + rows[k, 2 * axis + 1])
         rows[n, 2 * axis + 1 - side] = mid
         describe(nets[n], rows[n])
-        widened(nets[n], M, N, wide[n])
+        widened(nets[n], M, N, line, wide[n])
         links[n, 0] = -1
         links[n, 1] = -1
     links[k, axis] = used
     return used + 2
 
 
-@making
+@inner
 def edge(net: Array, axis: int, q: Array) -> float:
     """The extent of a net's middle line of an axis along q."""
     P = net.shape[0]
@@ -144,7 +147,7 @@ def edge(net: Array, axis: int, q: Array) -> float:
     return s
 
 
-@making
+@inner
 def inside(w: Array, at: int, box: Array, share: float) -> bool:
     """Whether two parameters lie in a box widened by a share of its size."""
     mu = share * (box[1] - box[0])
@@ -152,7 +155,7 @@ def inside(w: Array, at: int, box: Array, share: float) -> bool:
     return bool(box[0] - mu <= w[at] <= box[1] + mu and box[2] - mv <= w[at + 1] <= box[3] + mv)
 
 
-@making
+@inner
 def on_pieces(w: Array, ja: Array, jb: Array, tol: float) -> bool:
     """Whether four local parameters lie on their pieces within a length."""
     for k in range(4):
@@ -163,15 +166,17 @@ def on_pieces(w: Array, ja: Array, jb: Array, tol: float) -> bool:
     return True
 
 
-@making
+@inner
 def judge(
     A: Array, B: Array, net_a: Array, net_b: Array, wide_a: Array, wide_b: Array, box_a: Array, box_b: Array,
     rational: bool, tol: float, small: float, found: Array, work: tuple[Array, ...], info: Array,
 ) -> tuple[int, int]:  # fmt: skip
     """The code of a pair and the number of points put into `found` (k, 8): u v s t x y z gap."""
-    (F, c, w, p, f, RA, RB, EA, EB, D, S, G, KA, KB, HA, HB, bu, bv, h, ja, jb, ga, gb, frame) = work
+    (F, c, w, p, f, RA, RB, EA, EB, D, S, G, KA, KB, HA, HB, bu, bv, h, ja, jb, ga, gb, frame, _) = work
     info[0] = 0.0
     info[1] = 0.0
+    info[5] = 0.0
+    info[6] = 0.0
     info[11] = -1.0
     # common plane from the normals at the middles
     jets(A, 0.5 * (box_a[0] + box_a[1]), 0.5 * (box_a[2] + box_a[3]), bu, bv, h, ja)
@@ -247,6 +252,9 @@ def judge(
     hxy1 = HA[1, 1] - HB[1, 0]
     hyy0 = HA[2, 0] - HB[2, 1]
     hyy1 = HA[2, 1] - HB[2, 0]
+    # what is not known of each surface's height over the common rectangle: the vaguer one is split
+    info[5] = (HA[0, 1] - HA[0, 0]) * rx * rx + 2.0 * (HA[1, 1] - HA[1, 0]) * rx * ry + (HA[2, 1] - HA[2, 0]) * ry * ry
+    info[6] = (HB[0, 1] - HB[0, 0]) * rx * rx + 2.0 * (HB[1, 1] - HB[1, 0]) * rx * ry + (HB[2, 1] - HB[2, 0]) * ry * ry
     mxx = max(abs(hxx0), abs(hxx1))
     mxy = max(abs(hxy0), abs(hxy1))
     myy = max(abs(hyy0), abs(hyy1))
@@ -416,7 +424,7 @@ def judge(
     return centre, 0
 
 
-@making
+@inner
 def transversal(
     A: Array, B: Array, box_a: Array, box_b: Array, xm: float, ym: float, rx: float, ry: float,
     gx: float, gy: float, off: float, tol: float, found: Array, work: tuple[Array, ...],
@@ -425,18 +433,19 @@ def transversal(
     F, c, w, p = work[:4]
     bu, bv, h, ja, jb = work[16:21]
     frame = work[23]
+    scratch = work[24]
     border = False
     for k in range(2):
         border |= box_a[2 * k] <= 0.0 or box_a[2 * k + 1] >= 1.0 or box_b[2 * k] <= 0.0 or box_b[2 * k + 1] >= 1.0
     rt = abs(gy) * rx + abs(gx) * ry
-    T = np.empty(3)
+    T = frame[7]
     for k in range(3):
         T[k] = -gy * F[0, k] + gx * F[1, k]
     base = dot(T, c) - gy * xm + gx * ym
     if not border:
         for k in range(4):
             p[k] = w[k]
-        gap = slice_newton(A, B, p, T, base, 12, bu, bv, h, ja, jb, frame, 1e-12)
+        gap = slice_newton(A, B, p, T, base, 12, bu, bv, h, ja, jb, frame, STEP)
         if gap < 0.0 or gap > 1e-12 or not (inside(p, 0, box_a, 0.125) and inside(p, 2, box_b, 0.125)):
             return SPLIT, 0
         for k in range(4):
@@ -446,22 +455,43 @@ def transversal(
         found[0, 7] = gap
         return TRANSVERSAL, 1
     count = 0
-    signs = np.zeros((4, 2))
-    out = np.zeros(4)
-    d = np.empty(4)
+    signs = scratch[:4]
+    out = scratch[4]
+    d = scratch[5]
+    ahead = scratch[6:8]  # where the slices next to the middle one lead to
+    for k in range(4):
+        signs[k, 0] = signs[k, 1] = out[k] = 0.0
+    known = False
     solved = 0
-    for i in range(-2, 3):
-        for k in range(4):
-            p[k] = w[k]
-        gap = slice_newton(A, B, p, T, base + 0.5 * i * rt, 12, bu, bv, h, ja, jb, frame, 1e-12)
+    for k in range(4):
+        p[k] = w[k]
+    for slot in range(5):  # from the middle outward, each from its neighbour's point along the arc
+        i = (slot + 1) // 2 if slot % 2 == 1 else -(slot // 2)
+        if slot > 0 and known:
+            for k in range(4):
+                p[k] = ahead[slot % 2, k]
+        elif slot > 0:
+            for k in range(4):
+                p[k] = w[k]
+        gap = slice_newton(A, B, p, T, base + 0.5 * i * rt, 12, bu, bv, h, ja, jb, frame, STEP)
         if gap < 0.0 or gap > 1e-12 or not (inside(p, 0, box_a, 0.125) and inside(p, 2, box_b, 0.125)):
+            if slot > 0:
+                for k in range(4):
+                    ahead[slot % 2, k] = w[k]
             continue
         solved += 1
         # the parameters' velocities along the arc
         tangent = frame[4]
         turn = 1.0 if dot(tangent, T) > 0.0 else -1.0
         velocity(ja, jb, tangent, d)
+        step = 0.5 * rt / dot(tangent, T)
         for k in range(4):
+            if slot == 0:
+                ahead[0, k] = p[k] - step * d[k]
+                ahead[1, k] = p[k] + step * d[k]
+                known = True
+            else:
+                ahead[slot % 2, k] = p[k] + (step if i > 0 else -step) * d[k]
             if turn * d[k] > 0.0:
                 signs[k, 0] = 1.0
             else:
@@ -483,7 +513,7 @@ def transversal(
     return TRANSVERSAL, count
 
 
-@making
+@inner
 def velocity(ja: Array, jb: Array, T: Array, d: Array) -> None:
     """d = rates of u, v, s, t along the direction T."""
     for side in range(2):
@@ -527,12 +557,13 @@ def subdivide(
     rows_b = np.empty((B.shape[0], BOX))
     links_a = np.empty((A.shape[0], 2), np.int64)
     links_b = np.empty((B.shape[0], 2), np.int64)
+    line = np.empty((max(Q, S), 4))
     for k in range(ka):
         A[k] = nets_a[k]
         rows_a[k, 0] = rows_a[k, 2] = 0.0
         rows_a[k, 1] = rows_a[k, 3] = 1.0
         describe(A[k], rows_a[k])
-        widened(A[k], Ma, Na, wide_a[k])
+        widened(A[k], Ma, Na, line, wide_a[k])
         links_a[k, 0] = -1
         links_a[k, 1] = -1
     for k in range(kb):
@@ -540,7 +571,7 @@ def subdivide(
         rows_b[k, 0] = rows_b[k, 2] = 0.0
         rows_b[k, 1] = rows_b[k, 3] = 1.0
         describe(B[k], rows_b[k])
-        widened(B[k], Mb, Nb, wide_b[k])
+        widened(B[k], Mb, Nb, line, wide_b[k])
         links_b[k, 0] = -1
         links_b[k, 1] = -1
     used_a = ka
@@ -559,7 +590,7 @@ def subdivide(
         np.empty((R, S, 4)), np.empty((P, Q, 4)), np.empty((R, S, 4)), np.empty((5, 4, 2)), np.empty((3, 2)),
         np.empty((5, 3, 2)), np.empty((2, 2)), np.empty((2, 2)), np.empty((3, 2)), np.empty((3, 2)),
         np.empty((3, most)), np.empty((3, most)), np.empty((6, 4)), np.empty((6, 3)), np.empty((6, 3)),
-        np.empty(6), np.empty(6), np.empty((5, 3)),
+        np.empty(6), np.empty(6), np.empty((FRAME, 4)), np.empty((12, 4)),
     )  # fmt: skip
     for first in range(ka):
         for second in range(kb):
@@ -592,6 +623,10 @@ def subdivide(
                     continue
                 if code == SPLIT:
                     cut = 0 if ra[10] >= rb[10] else 2
+                    if info[5] > VAGUER * info[6]:
+                        cut = 0
+                    elif info[6] > VAGUER * info[5]:
+                        cut = 2
                     cut += int(ra[11]) if cut == 0 else int(rb[11])
                     if (
                         info[1] > 0.0 and ra[10] < 4.0 * rb[10] and rb[10] < 4.0 * ra[10]
@@ -610,7 +645,7 @@ def subdivide(
                                 wide_a = grown(wide_a)
                                 rows_a = grown(rows_a)
                                 links_a = grown(links_a)
-                            used_a = children(a, cut, used_a, A, wide_a, rows_a, links_a, Ma, Na)
+                            used_a = children(a, cut, used_a, A, wide_a, rows_a, links_a, Ma, Na, line)
                         one = links_a[a, cut]
                         stack[top, 0] = one
                         stack[top, 1] = b
@@ -623,7 +658,7 @@ def subdivide(
                                 wide_b = grown(wide_b)
                                 rows_b = grown(rows_b)
                                 links_b = grown(links_b)
-                            used_b = children(b, cut - 2, used_b, B, wide_b, rows_b, links_b, Mb, Nb)
+                            used_b = children(b, cut - 2, used_b, B, wide_b, rows_b, links_b, Mb, Nb, line)
                         one = links_b[b, cut - 2]
                         stack[top, 0] = a
                         stack[top, 1] = one

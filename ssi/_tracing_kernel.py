@@ -11,15 +11,16 @@ import math
 
 import numpy as np
 
-from patchwright.models._compile_kernel import kernel, making
+from patchwright.models._compile_kernel import inner, kernel
 from patchwright.models.arrays import Array, IntArray
-from patchwright.ssi._jet_kernel import curve_jet, dot, jets, normals, slice_newton
+from patchwright.ssi._jet_kernel import FRAME, curve_jet, dot, jets, normals, slice_newton
 
 BORDER, CLOSED, BALL, STUCK = range(4)
+STEP = 1e-9  # Newton's last step: the next would be its square, below round-off
 NODE = 22  # 3 x 7 jet, then the length of the piece that begins at the node
 
 
-@making
+@inner
 def hermite(a: Array, b: Array, L: float, t: float, out: Array) -> None:
     """out[0..6] = the quintic Hermite piece between the jets a and b (21,) of length L at t in [0, 1]."""
     t2 = t * t
@@ -38,7 +39,7 @@ def hermite(a: Array, b: Array, L: float, t: float, out: Array) -> None:
         )
 
 
-@making
+@inner
 def speed(a: Array, b: Array, L: float, t: float) -> float:
     """The length of the space part's derivative by t."""
     t2 = t * t
@@ -54,7 +55,7 @@ def speed(a: Array, b: Array, L: float, t: float) -> float:
     return math.sqrt(s)
 
 
-@making
+@inner
 def piece_length(a: Array, b: Array) -> float:
     """The length L for which the Hermite piece is as long as L: Gauss quadrature, fixed point."""
     chord = 0.0
@@ -79,7 +80,7 @@ def piece_length(a: Array, b: Array) -> float:
     return L
 
 
-@making
+@inner
 def border_newton(A: Array, B: Array, w: Array, k: int, work: tuple[Array, ...]) -> bool:
     """Solve A = B with parameter k held: three equations in the other three."""
     bu, bv, h, ja, jb = work[:5]
@@ -117,24 +118,20 @@ def border_newton(A: Array, B: Array, w: Array, k: int, work: tuple[Array, ...])
     return bool(move < 1e-9)
 
 
-@making
+@inner
 def slack(j: Array, k: int, tol: float) -> float:
     """The parameter difference that moves a point by tol, at most 0.1."""
     return min(tol / max(math.sqrt(dot(j[k], j[k])), 1e-300), 0.1)
 
 
-@making
+@inner
 def march(
     A: Array, B: Array, w: Array, T0: Array, balls: Array, home: Array, longest: float, fit: float, tol: float,
     nodes: Array, work: tuple[Array, ...],
 ) -> tuple[int, int, int]:  # fmt: skip
     """Nodes from w along T0: their number, how it ended, and in which ball."""
-    bu, bv, h, ja, jb, frame = work
-    T = np.empty(3)
-    p = np.empty(4)
-    new = np.empty(NODE)
-    mid = np.empty(7)
-    jet = np.empty((3, 7))
+    bu, bv, h, ja, jb, frame, p, new, mid, jet = work
+    T = frame[7]
     jets(A, w[0], w[1], bu, bv, h, ja)
     jets(B, w[2], w[3], bu, bv, h, jb)
     if normals(ja, jb, frame) <= 0.0:
@@ -182,7 +179,7 @@ def march(
         for c in range(3):
             T[c] = a[7 + c]
             level += T[c] * a[c]
-        gap = slice_newton(A, B, p, T, level + step, 10, bu, bv, h, ja, jb, frame, 1e-13)
+        gap = slice_newton(A, B, p, T, level + step, 10, bu, bv, h, ja, jb, frame, STEP)
         if gap < 0.0 or gap > 1e-12:
             step *= 0.5
             continue
@@ -310,9 +307,9 @@ def trace(
     most = max(max(A.shape[0], A.shape[1]), max(B.shape[0], B.shape[1])) + 1
     work = (
         np.empty((3, most)), np.empty((3, most)), np.empty((6, 4)), np.empty((6, 3)), np.empty((6, 3)),
-        np.empty((5, 3)),
+        np.empty((FRAME, 4)), np.empty(4), np.empty(NODE), np.empty(7), np.empty((3, 7)),
     )  # fmt: skip
-    bu, bv, h, ja, jb, frame = work
+    bu, bv, h, ja, jb, frame, _, _, _, jet = work
     ahead = np.empty((4000, NODE))
     behind = np.empty((4000, NODE))
     nodes = np.empty((512, NODE))
@@ -342,7 +339,7 @@ def trace(
         jets(B, w[2], w[3], bu, bv, h, jb)
         if normals(ja, jb, frame) <= 0.0:
             continue
-        T[:] = frame[4]
+        T[:] = frame[4, :3]
         gap = slice_newton(A, B, w, T, 0.5 * (dot(T, ja[0]) + dot(T, jb[0])), 10, bu, bv, h, ja, jb, frame, 1e-13)
         if gap < 0.0:
             continue
@@ -355,14 +352,18 @@ def trace(
         done[k] = True
         if out_of > 0.02:
             continue
-        home[0] = 0.0
+        jets(A, w[0], w[1], bu, bv, h, ja)
+        jets(B, w[2], w[3], bu, bv, h, jb)
+        if normals(ja, jb, frame) <= 0.0:
+            continue
+        if not curve_jet(ja, jb, frame, 1.0 if dot(frame[4], T) > 0.0 else -1.0, w, jet):
+            continue
+        home[0] = 1.0  # the start is a goal: closed loops
+        for i in range(21):
+            home[1 + i] = jet[i // 7, i % 7]
         n1, e1, b1 = march(A, B, w, T, balls, home, longest, fit, tol, ahead, work)
         if n1 == 0:
             continue
-        # closed loops: march again with the start as a goal
-        home[0] = 1.0
-        home[1:22] = ahead[0, :21]
-        n1, e1, b1 = march(A, B, w, T, balls, home, longest, fit, tol, ahead, work)
         n2 = 1
         e2 = e1
         b2 = -1
@@ -437,7 +438,7 @@ def corrected(A: Array, B: Array, starts: Array, T: Array, level: Array) -> tupl
     most = max(max(A.shape[0], A.shape[1]), max(B.shape[0], B.shape[1])) + 1
     bu, bv, h, ja, jb, frame = (
         np.empty((3, most)), np.empty((3, most)), np.empty((6, 4)), np.empty((6, 3)), np.empty((6, 3)),
-        np.empty((5, 3)),
+        np.empty((FRAME, 4)),
     )  # fmt: skip
     out = np.zeros((starts.shape[0], 3, 7))
     gaps = np.empty(starts.shape[0])

@@ -12,14 +12,14 @@ import math
 
 import numpy as np
 
-from patchwright.models._compile_kernel import kernel, making
+from patchwright.models._compile_kernel import inner, kernel
 from patchwright.models.arrays import Array, IntArray
 from patchwright.ssi._graph_kernel import difference
 from patchwright.ssi._jet_kernel import cross, dot, jets, tangent_coordinates, unit
 from patchwright.ssi._tracing_kernel import BALL, BORDER, CLOSED, STUCK, slack
 
 
-@making
+@inner
 def bottom(
     A: Array, B: Array, w: Array, T: Array, level: float, everywhere: Array, work: tuple[Array, ...], row: Array
 ) -> bool:
