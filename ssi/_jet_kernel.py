@@ -8,7 +8,6 @@ import math
 from patchwright.models._compile_kernel import inlined, inner
 from patchwright.models.arrays import Array
 
-
 FRAME = 8  # rows of the arrays in which the two normals and what follows from them are kept
 
 

@@ -113,7 +113,8 @@ def halves(net: Array, axis: int, left: Array, right: Array) -> None:
 
 @inner
 def children(
-    k: int, axis: int, used: int, nets: Array, wide: Array, rows: Array, links: IntArray, M: Array, N: Array, line: Array
+    k: int, axis: int, used: int, nets: Array, wide: Array, rows: Array, links: IntArray, M: Array, N: Array,
+    line: Array,
 ) -> int:  # fmt: skip
     """Make the two children of node k at `used` and `used` + 1; the new number of nodes."""
     halves(nets[k], axis, nets[used], nets[used + 1])

@@ -17,6 +17,7 @@ from patchwright.ssi._jet_kernel import FRAME, curve_jet, dot, jets, normals, sl
 
 BORDER, CLOSED, BALL, STUCK = range(4)
 STEP = 1e-9  # Newton's last step: the next would be its square, below round-off
+MOST = 4000  # nodes of an arc on one pair of pieces
 NODE = 22  # 3 x 7 jet, then the length of the piece that begins at the node
 
 
@@ -300,18 +301,18 @@ def march(
 
 @kernel
 def trace(
-    A: Array, B: Array, seeds: Array, balls: Array, longest: float, fit: float, tol: float
+    A: Array, B: Array, seeds: Array, balls: Array, longest: float, fit: float, tol: float, room: Array
 ) -> tuple[Array, IntArray]:  # fmt: skip
     """Arcs through the seeds (k, 7) u v s t x y z: nodes (n, NODE) and one row per arc: first node, end, how it
-    ended behind and ahead, the balls."""
+    ended behind and ahead, the balls. `room` (2, MOST, NODE) is scratch."""
     most = max(max(A.shape[0], A.shape[1]), max(B.shape[0], B.shape[1])) + 1
     work = (
         np.empty((3, most)), np.empty((3, most)), np.empty((6, 4)), np.empty((6, 3)), np.empty((6, 3)),
         np.empty((FRAME, 4)), np.empty(4), np.empty(NODE), np.empty(7), np.empty((3, 7)),
     )  # fmt: skip
     bu, bv, h, ja, jb, frame, _, _, _, jet = work
-    ahead = np.empty((4000, NODE))
-    behind = np.empty((4000, NODE))
+    ahead = room[0]
+    behind = room[1]
     nodes = np.empty((512, NODE))
     arcs = np.empty((64, 6), np.int64)
     n = 0
@@ -467,4 +468,17 @@ def surface_jets(net: Array, uv: Array) -> Array:
     out = np.empty((uv.shape[0], 6, 3))
     for k in range(uv.shape[0]):
         jets(net, uv[k, 0], uv[k, 1], bu, bv, h, out[k])
+    return out
+
+
+@kernel
+def speeds(nets: Array, which: IntArray, uv: Array) -> Array:
+    """(k, 2) |S_u| and |S_v| of the pieces `which` (k,) of nets (n, p + 1, q + 1, 4) at local parameters (k, 2)."""
+    most = max(nets.shape[1], nets.shape[2]) + 1
+    bu, bv, h, j = np.empty((3, most)), np.empty((3, most)), np.empty((6, 4)), np.empty((6, 3))
+    out = np.empty((uv.shape[0], 2))
+    for k in range(uv.shape[0]):
+        jets(nets[which[k]], uv[k, 0], uv[k, 1], bu, bv, h, j)
+        for axis in range(2):
+            out[k, axis] = math.sqrt(dot(j[1 + axis], j[1 + axis]))
     return out

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from patchwright.models.arrays import Array, IntArray
+from patchwright.models.arrays import Array, BoolArray, IntArray
 from patchwright.models.surface import Surface
 from patchwright.ssi.bezier_pieces import BezierPieces, Frame
 from patchwright.ssi.intersection import CurveKind
@@ -38,26 +38,24 @@ class Arc:
         return replace(self, jets=jets, lengths=self.lengths[::-1].copy(), ends=self.ends[::-1], smooth=smooth)
 
 
-def in_own_parameters(
-    jets: Array, lengths: Array, pieces: tuple[BezierPieces, BezierPieces], which: tuple[int, int], frame: Frame
-) -> tuple[Array, Array]:
-    """Jets (n, 3, 7) and lengths of scaled, local ones in model units and NURBS parameters."""
+def in_own_parameters(jets: Array, pieces: tuple[BezierPieces, BezierPieces], which: IntArray, frame: Frame) -> Array:
+    """Jets (n, 3, 7) of scaled, local ones on pairs of pieces (n, 2) in model units and NURBS parameters."""
     out = jets.copy()
     out[:, 0, :3] = frame.origin + frame.size * jets[:, 0, :3]
     out[:, 2, :3] /= frame.size
-    for side, (piece, k) in enumerate(zip(pieces, which, strict=True)):
-        at = slice(3 + 2 * side, 5 + 2 * side)
+    for side, piece in enumerate(pieces):
+        at, k = slice(3 + 2 * side, 5 + 2 * side), which[:, side]
         out[:, 0, at] = piece.parameters(k, np.clip(jets[:, 0, at], 0.0, 1.0))
         out[:, 1, at] *= piece.width[k] / frame.size
         out[:, 2, at] *= piece.width[k] / frame.size**2
-    return out, lengths * frame.size
+    return out
 
 
 def in_analytic_parameters(jets: Array, side: int, surface: Surface, middle: Array) -> Array:
     """The jets with the parameters of the NURBS form replaced by those of the analytic surface itself.
 
     Both forms share their iso-curves, so each parameter is a function of its own; it is read off along the middle of
-    the other, where the surface is regular. `middle` (2,) lies inside the span: derivatives at knots are its.
+    the other, where the surface is regular. `middle` (n, 2) lies inside the spans: derivatives at knots are theirs.
     """
     nurbs = surface.to_nurbs()
     if nurbs is surface:
@@ -69,7 +67,7 @@ def in_analytic_parameters(jets: Array, side: int, surface: Surface, middle: Arr
         at = 3 + 2 * side + axis
         t = np.clip(jets[:, 0, at], *nurbs.domain[axis])
         other, mine = np.full(t.shape, place[1 - axis]), np.full(t.shape, own_place[1 - axis])
-        inner = t + 1e-8 * (middle[axis] - t)
+        inner = t + 1e-8 * (middle[:, axis] - t)
         first, second = ((1, 0), (2, 0)) if axis == 0 else ((0, 1), (0, 2))
 
         def along(s: Surface, values: Array, nu: tuple[int, int], axis: int = axis, other: Array = other) -> Array:
@@ -109,11 +107,11 @@ def _matched(surface: Surface, nurbs: Surface) -> tuple[Array, Array]:
     return uv, own
 
 
-def without_repeats(arcs: list[Arc], along_border: list[bool], scale: Array) -> list[Arc]:
+def without_repeats(arcs: list[Arc], along_border: BoolArray, scale: Array) -> list[Arc]:
     """Arcs that run along a border of their pieces are found on both sides of it: one of each is kept."""
     from scipy.spatial import cKDTree
 
-    if not any(along_border):
+    if not along_border.any():
         return arcs
     clouds = [samples(a) for a in arcs]
     out = [a for a, flag in zip(arcs, along_border, strict=True) if not flag]
@@ -210,9 +208,8 @@ def _chained(chain: list[Arc], closed: bool) -> Arc:
     breaks: list[Array] = [np.ones(chain[0].jets.shape[0])]
     for arc in chain[1:]:
         last = jets[-1][-1]
-        first = arc.jets[0].copy()
-        gap = np.abs(first[1] - last[1]).max(initial=0.0)
-        breaks[-1] = breaks[-1].copy()
+        first = arc.jets[0]
+        gap = np.abs(first[1] - last[1]).max()
         breaks[-1][-1] = 1.0 if gap <= 1e-8 * (1.0 + np.abs(last[1]).max()) else 0.0
         jets.append(arc.jets)
         lengths.append(arc.lengths)

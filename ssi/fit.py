@@ -6,20 +6,33 @@ samples than nodes were used, between the three curves and both surfaces.
 
 from __future__ import annotations
 
+import itertools
+import math
+from collections.abc import Sequence
+
 import numpy as np
 
 from patchwright.models.arrays import Array
-from patchwright.models.knots import between
 from patchwright.models.nurbs_curve import NurbsCurve
 from patchwright.models.surface import Surface
 from patchwright.ssi.arcs import Arc
 from patchwright.ssi.intersection import IntersectionCurve
 
 SAMPLES = 20  # per piece; a piece has two nodes
+DEGREE = 5
 
 
-def fitted(arc: Arc, a: Surface, b: Surface) -> IntersectionCurve:
-    """The curve of an arc."""
+def fitted(arcs: Sequence[Arc], a: Surface, b: Surface) -> list[IntersectionCurve]:
+    """The curves of arcs."""
+    if not arcs:
+        return []
+    low, high = np.array([*a.domain, *b.domain]).T
+    nets = [_pieces(arc, low, high) for arc in arcs]
+    return [_curve(arc, net, far) for arc, net, far in zip(arcs, nets, _residuals(nets, a, b), strict=True)]
+
+
+def _pieces(arc: Arc, low: Array, high: Array) -> Array:
+    """(n, 6, 7) Bezier points of the Hermite pieces; parameters a round-off beyond their ranges are put on them."""
     jets, lengths = arc.jets, arc.lengths
     keep = np.flatnonzero(lengths > 0.0)
     L = lengths[keep][:, None]
@@ -35,38 +48,46 @@ def fitted(arc: Arc, a: Surface, b: Surface) -> IntersectionCurve:
         ),
         axis=1,
     )
-    s = np.concatenate(([0.0], np.cumsum(L[:, 0])))
+    slack = 1e-8 * (high - low)
+    uv = net[..., 3:]
+    near = (uv > low - slack) & (uv < high + slack)
+    net[..., 3:] = np.where(near, np.clip(uv, low, high), uv)
+    return net
+
+
+def _curve(arc: Arc, net: Array, residual: float) -> IntersectionCurve:
+    keep = np.flatnonzero(arc.lengths > 0.0)
     smooth = np.ones(keep.shape[0] + 1, dtype=bool)
     if arc.smooth is not None:
         smooth[1:-1] = arc.smooth[keep[1:]] * arc.smooth[keep[:-1] + 1] > 0.0
-    knots, control = [np.repeat(s[0], 6)], [net[0, :1]]
-    for i in range(keep.shape[0]):
-        last = i == keep.shape[0] - 1
-        control.append(net[i, 1:5])
-        if last or not smooth[i + 1]:
-            control.append(net[i, 5:])
-        knots.append(np.repeat(s[i + 1], 6 if last else 4 if smooth[i + 1] else 5))
-    U, Q = np.concatenate(knots), np.concatenate(control)
-    for side, surface in enumerate((a, b)):
-        for axis in (0, 1):
-            low, high = surface.domain[axis]
-            column = Q[:, 3 + 2 * side + axis]
-            slack = 1e-8 * (high - low)
-            near = (column > low - slack) & (column < high + slack)
-            column[near] = np.clip(column[near], low, high)
-    curve, uv_a, uv_b = (NurbsCurve(5, U, Q[:, c]) for c in (slice(0, 3), slice(3, 5), slice(5, 7)))
-    points = np.concatenate((p[:, 0, :3], q[-1:, 0, :3]))
-    return IntersectionCurve(curve, uv_a, uv_b, points, arc.kind, arc.closed, measured(curve, uv_a, uv_b, a, b))
+    # a smooth knot is four-fold: the control points beside it stay, the one at it follows from them
+    count = np.where(smooth, 4, 5)
+    count[0] = count[-1] = DEGREE + 1
+    U = np.repeat(np.concatenate(([0.0], np.cumsum(arc.lengths[keep]))), count)
+    stays = np.ones(net.shape[:2], dtype=bool)
+    stays[1:, 0] = False
+    stays[:-1, DEGREE] = ~smooth[1:-1]
+    Q = net[stays]
+    curve, uv_a, uv_b = (NurbsCurve(DEGREE, U, Q[:, c]) for c in (slice(0, 3), slice(3, 5), slice(5, 7)))
+    points = np.concatenate((net[:, 0, :3], net[-1:, -1, :3]))
+    return IntersectionCurve(curve, uv_a, uv_b, points, arc.kind, arc.closed, residual)
 
 
-def measured(curve: NurbsCurve, uv_a: NurbsCurve, uv_b: NurbsCurve, a: Surface, b: Surface) -> float:
-    """The largest distance between a curve, uv_a on a and uv_b on b on samples inside every piece."""
-    t = between(curve.breaks, SAMPLES)
-    x = curve(t)
-    on = []
-    for uv, surface in ((uv_a, a), (uv_b, b)):
-        w = uv(t)
+def _residuals(nets: Sequence[Array], a: Surface, b: Surface) -> list[float]:
+    """The largest distance between each curve, its image on a and that on b on samples inside every piece."""
+    at = np.tensordot(np.concatenate(nets), _BERNSTEIN, axes=(1, 1)).swapaxes(1, 2).reshape(-1, 7)
+    places = [at[:, :3]]
+    for w, surface in ((at[:, 3:5], a), (at[:, 5:7], b)):
         (u0, u1), (v0, v1) = surface.domain
-        on.append(surface(np.clip(w[:, 0], u0, u1), np.clip(w[:, 1], v0, v1)))
-    gaps: Array = np.stack((x - on[0], x - on[1], on[0] - on[1]))
-    return float(np.sqrt((gaps * gaps).sum(axis=-1)).max())
+        places.append(surface(w[:, 0].clip(u0, u1), w[:, 1].clip(v0, v1)))
+    worst = np.zeros(len(at))
+    for one, other in itertools.combinations(places, 2):
+        gap = one - other
+        np.maximum(worst, np.einsum("ij,ij->i", gap, gap), out=worst)
+    first = np.cumsum([0] + [SAMPLES * len(net) for net in nets[:-1]])
+    return [float(far) for far in np.sqrt(np.maximum.reduceat(worst, first))]
+
+
+_T = (np.arange(SAMPLES) + 0.5)[:, None] / SAMPLES
+_K = np.arange(DEGREE + 1)
+_BERNSTEIN = np.array([math.comb(DEGREE, k) for k in range(DEGREE + 1)]) * _T**_K * (1.0 - _T) ** (DEGREE - _K)

@@ -6,8 +6,9 @@ smooth between the breaks of the space curve and the places where it crosses kno
 is interpolated by a spline of degree 7, its sites halved where the surface at the fitted parameters is off the curve.
 Seams and poles lie at breaks of the closed form's curves, so that parameters jump at knots only.
 
-Limits: a NURBS surface that deviates from its analytic form by more than a hundredth of the tolerance, does not fill
-its ranges, or along which a fit stays above 1e-10 of the size is left to subdivision.
+Limits: a polynomial (not rational) NURBS surface other than a plane, one that deviates from its analytic form by more
+than a hundredth of the tolerance, does not fill its ranges, or along which a fit stays above 1e-10 of the size is left
+to subdivision.
 """
 
 from __future__ import annotations
@@ -79,6 +80,8 @@ def _analytic(surface: Surface, tolerance: float) -> Analytic | Recognised | Non
     if isinstance(surface, KINDS):
         return surface
     native = surface.to_nurbs()
+    if native.weights is None and not _nearly_flat(native):
+        return None  # of the analytic surfaces only planes are polynomial
     us, vs = native.breaks
     i, j = (us.size - 1) // 2, (vs.size - 1) // 2
     if (us.size - 1) * (vs.size - 1) > MANY:  # of a large free-form surface one span tells at once
@@ -87,6 +90,14 @@ def _analytic(surface: Surface, tolerance: float) -> Analytic | Recognised | Non
             return None
     found = recognise(native, DEVIATION * tolerance)
     return found if found is not None and found.fills and _trusted(found) else None
+
+
+def _nearly_flat(native: NurbsSurface) -> bool:
+    """Whether the control points lie in a plane to a thousandth of their extent."""
+    points = native.control_points.reshape(-1, 3)
+    local = points - points.mean(axis=0)
+    values = np.linalg.eigvalsh(local.T @ local)
+    return bool(values[0] <= 1e-6 * values[2])
 
 
 def _trusted(found: Recognised) -> bool:

@@ -10,7 +10,8 @@ import numpy as np
 from patchwright.models.arrays import Array, IntArray
 from patchwright.ssi.bezier_pieces import BezierPieces
 
-RADIUS = 2e-3  # of the size: inside, a branch is one piece from its last node to the point
+RADIUS = 1e-3  # of the size: inside, a branch is one piece from its last node to the point
+CLUSTER = 2e-3  # the same where more than two branches meet: nearer, angles of 1e-6 cost the points their digits
 MERGE = 1e-6  # of the size: contacts nearer than this are one
 
 
@@ -75,7 +76,7 @@ def balls_of(rows: Array, tol: float, pieces: tuple[BezierPieces, BezierPieces])
             if pole:
                 centre = point
             elif np.linalg.norm(part[:, 15:18].max(axis=0) - part[:, 15:18].min(axis=0)) < 1e-2:
-                radius = max(radius, 1e-3)
+                radius = max(radius, CLUSTER)
             out.append(Ball(centre, radius, "cluster", 0.0, tuple(places.items()), part, pole))
     return out, plain
 

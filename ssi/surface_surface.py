@@ -20,22 +20,20 @@ import numpy as np
 from patchwright.models.arrays import Array, BoolArray, IntArray
 from patchwright.models.errors import ParameterError
 from patchwright.models.surface import Surface
-from patchwright.ssi.arcs import Arc, in_analytic_parameters, in_own_parameters, joined, samples, without_repeats
+from patchwright.ssi.arcs import Arc, joined, samples
 from patchwright.ssi.bezier_pieces import BezierPieces, Frame, widening
 from patchwright.ssi.fit import fitted
+from patchwright.ssi.following import Ground, crossing_arcs, touching_arcs
 from patchwright.ssi.intersection import Box, Contact, Intersection, Unresolved
-from patchwright.ssi.singular_points import Ball, arc_to_centre, balls_of, ray_seeds
-from patchwright.ssi.tangential import TURN, jets_of, steady
+from patchwright.ssi.singular_points import Ball, balls_of
 
 if TYPE_CHECKING:
     from patchwright.models.nurbs_surface import NurbsSurface
 
 BUDGET = 300_000  # pairs of boxes judged; 10 to 20 microseconds each
 SMALL = 1e-8  # of the size: boxes are not split below
-FIT = 1e-11  # of the size: residual asked of a piece of a curve
 WORST = 1e-6  # of the size: a curve that is further off is not returned but reported
 WILD = 1e6  # sizes: a longer arc is a step that went astray near a singular point
-LONGEST = 0.25  # of the size: longest step
 
 
 def intersect_surfaces(a: Surface, b: Surface, tolerance: float) -> Intersection:
@@ -81,29 +79,30 @@ class _Work:
         self.a, self.b, self.nurbs, self.pieces, self.frame, self.tol = a, b, nurbs, pieces, frame, tol
         self.rows, self.left = rows, left
         self.codes: IntArray = rows[:, 0].astype(np.int64)
-        (u, v), (s, t) = a.domain, b.domain
-        spans = [hi - lo for lo, hi in (u, v, s, t)]
-        self.scale = np.array([frame.size] * 3 + spans)
+        self.ground = Ground(a, b, pieces, frame, tol)
         self.unresolved: list[Unresolved] = []
 
     def result(self) -> Intersection:
         from patchwright.ssi._subdivision_kernel import BUDGET as OVER
-        from patchwright.ssi._subdivision_kernel import OVERLAP, TANGENT
+        from patchwright.ssi._subdivision_kernel import OVERLAP, TANGENT, TRANSVERSAL
 
         balls, plain = balls_of(self.rows, self.tol, self.pieces)
-        arcs = self._arcs(balls)
-        branches = joined(arcs, self.scale)
-        branches += joined(self._tangent_arcs(balls), self.scale)
+        branches: list[Arc] = []
+        for code, follow in ((TRANSVERSAL, crossing_arcs), (TANGENT, touching_arcs)):
+            arcs, stuck = follow(self.rows[self.codes == code], balls, self.ground)
+            branches += joined(arcs, self.ground.scale)
+            for at, which in stuck:
+                self._stuck(at, which)
         self._check_ends(branches)
-        curves = []
+        sound = [arc for arc in branches if self._sound(arc)]
+        limit = max(WORST * self.frame.size, 16.0 * self.tol * self.frame.size)
+        pairs = list(zip(sound, fitted(sound, self.a, self.b), strict=True))
+        curves = [curve for _, curve in pairs if curve.residual <= limit]
         for arc in branches:
             if not self._sound(arc):
                 self._drop(arc)
-                continue
-            curve = fitted(arc, self.a, self.b)
-            if curve.residual <= max(WORST * self.frame.size, 16.0 * self.tol * self.frame.size):
-                curves.append(curve)
-            else:
+        for arc, curve in pairs:
+            if not curve.residual <= limit:
                 self._drop(arc)
         contacts = self._contacts(balls, branches)
         for ball in plain:
@@ -124,99 +123,6 @@ class _Work:
         """Whether an arc's numbers are finite and its length one that surfaces of this size can hold."""
         finite = bool(np.isfinite(arc.jets).all() and np.isfinite(arc.lengths).all())
         return finite and float(arc.lengths.sum()) < WILD * self.frame.size
-
-    def _arcs(self, balls: list[Ball]) -> list[Arc]:
-        from patchwright.ssi._subdivision_kernel import TRANSVERSAL
-        from patchwright.ssi._tracing_kernel import BALL, STUCK, trace
-
-        seeds = self.rows[self.codes == TRANSVERSAL]
-        pairs: dict[tuple[int, int], list[Array]] = {}
-        order = np.lexsort((seeds[:, 2], seeds[:, 1]))
-        seeds = seeds[order]
-        cuts = np.flatnonzero(np.any(np.diff(seeds[:, 1:3], axis=0) != 0, axis=1)) + 1
-        for group in np.split(seeds, cuts):
-            if group.size:
-                pairs[int(group[0, 1]), int(group[0, 2])] = [group[:, 11:18]]
-        for which, extra in ray_seeds(balls, self.pieces, self.tol):
-            pairs.setdefault(which, []).append(extra)
-        spheres = np.array([[*ball.centre, ball.radius] for ball in balls]).reshape(-1, 4)
-        out: list[Arc] = []
-        along: list[bool] = []
-        for (i, j), groups in pairs.items():
-            nodes, arcs = trace(
-                self.pieces[0].nets[i], self.pieces[1].nets[j], np.ascontiguousarray(np.concatenate(groups)), spheres,
-                LONGEST, FIT, min(self.tol, 1e-12),
-            )  # fmt: skip
-            for first, end, behind, ahead, ball0, ball1 in arcs.tolist():
-                if end - first < 2:
-                    continue
-                jets, lengths = nodes[first:end, :21].reshape(-1, 3, 7), nodes[first : end - 1, 21]
-                ends = [-1, -1]
-                for side, (code, ball) in enumerate(((behind, ball0), (ahead, ball1))):
-                    if code == BALL:
-                        jets, lengths = arc_to_centre(jets, lengths, side, balls[ball], (i, j))
-                        ends[side] = ball
-                    elif code == STUCK:
-                        at = jets[0 if side == 0 else -1, 0]
-                        self._stuck(at, (i, j))
-                        ends[side] = len(balls) + 1
-                jets, lengths = in_own_parameters(jets, lengths, self.pieces, (i, j), self.frame)
-                along.append(self._along_border(nodes[first:end, 3:7], (i, j)))
-                jets = self._own(jets, (i, j))
-                closed = behind == 1
-                out.append(Arc(jets, lengths, (ends[0], ends[1]), "transversal", closed))
-        return without_repeats(out, along, self.scale)
-
-    def _tangent_arcs(self, balls: list[Ball]) -> list[Arc]:
-        from patchwright.ssi._subdivision_kernel import TANGENT
-        from patchwright.ssi._tracing_kernel import BALL, STUCK
-        from patchwright.ssi._valley_kernel import trace_valleys
-
-        found = self.rows[self.codes == TANGENT]
-        spheres = np.array([[*ball.centre, max(ball.radius, 1e-6)] for ball in balls]).reshape(-1, 4)
-        out: list[Arc] = []
-        along: list[bool] = []
-        for i, j in np.unique(found[:, 1:3].astype(np.int64), axis=0).tolist():
-            seeds = found[(found[:, 1] == i) & (found[:, 2] == j)][:, 11:18]
-            rows, arcs = trace_valleys(
-                self.pieces[0].nets[i], self.pieces[1].nets[j], np.ascontiguousarray(seeds), spheres, 0.1, TURN,
-                4.0 * self.tol,
-            )  # fmt: skip
-            for first, end, behind, ahead, ball0, ball1 in arcs.tolist():
-                if end - first < 2:
-                    continue
-                steady(rows[first:end], self.pieces[0].nets[i], self.pieces[1].nets[j])
-                jets, lengths = jets_of(rows[first:end], behind == 1)
-                ends = [-1, -1]
-                for side, (code, ball) in enumerate(((behind, ball0), (ahead, ball1))):
-                    if code == BALL:
-                        jets, lengths = arc_to_centre(jets, lengths, side, balls[ball], (i, j))
-                        ends[side] = ball
-                    elif code == STUCK:
-                        self._stuck(jets[0 if side == 0 else -1, 0], (i, j))
-                        ends[side] = len(balls) + 1
-                jets, lengths = in_own_parameters(jets, lengths, self.pieces, (i, j), self.frame)
-                along.append(True)
-                out.append(Arc(self._own(jets, (i, j)), lengths, (ends[0], ends[1]), "tangential", behind == 1))
-        return without_repeats(out, along, self.scale)
-
-    def _own(self, jets: Array, which: tuple[int, int]) -> Array:
-        """Jets in NURBS parameters to those of the surfaces given."""
-        half = np.array([0.5, 0.5])
-        jets = in_analytic_parameters(jets, 0, self.a, self.pieces[0].parameters(which[0], half))
-        return in_analytic_parameters(jets, 1, self.b, self.pieces[1].parameters(which[1], half))
-
-    def _along_border(self, local: Array, which: tuple[int, int]) -> bool:
-        """Whether nodes (n, 4) all lie within the tolerance of one border of their pieces."""
-        from patchwright.ssi._tracing_kernel import surface_jets
-
-        for side in (0, 1):
-            w = np.ascontiguousarray(local[:, 2 * side : 2 * side + 2])
-            j = surface_jets(self.pieces[side].nets[which[side]], w)
-            speed = np.linalg.norm(j[:, 1:3], axis=2)
-            if (np.minimum(w, 1.0 - w) * speed).max(axis=0).min() <= 20.0 * self.tol:
-                return True
-        return False
 
     def _box(self, side: int, piece: int, local: Array) -> Box:
         low = self.pieces[side].parameters(piece, local[[0, 2]])
@@ -309,7 +215,7 @@ class _Work:
             uv_a, uv_b = self.pieces[0].parameters(i, w[:2]), self.pieces[1].parameters(j, w[2:])
             row = np.zeros((1, 3, 7))
             row[0, 0] = [*x, *uv_a, *uv_b]
-            row = self._own(row, (i, j))
+            row = self.ground.own(row, np.array([[i, j]]))
             uv = [float(t) for t in row[0, 0, 3:]]
             kind = "touch" if ball.kind == "touch" or arcs == 0 else "branch"
             out.append(Contact(x, (uv[0], uv[1]), (uv[2], uv[3]), kind, ball.gap * self.frame.size))  # type: ignore[arg-type]

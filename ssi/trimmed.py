@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from patchwright.models.arrays import Array, BoolArray
+from patchwright.models.arrays import Array, BoolArray, IntArray
 from patchwright.models.knots import divided
 from patchwright.models.nurbs_curve import NurbsCurve
 from patchwright.models.surface import Surface
@@ -144,14 +144,14 @@ def _together(uv: Array, other: Array, surface: Surface, low: Array, high: Array
     return np.asarray(apart <= ON * size)
 
 
-def _rays_cut(uv: Array, polygon: Array) -> Array:
+def _rays_cut(uv: Array, polygon: Array) -> IntArray:
     """(n,) how many edges of a polygon the ray along u from each point cuts."""
     after = np.roll(polygon, -1, axis=0)
     spans = (polygon[None, :, 1] > uv[:, 1:]) != (after[None, :, 1] > uv[:, 1:])
     with np.errstate(divide="ignore", invalid="ignore"):
         share = (uv[:, 1:] - polygon[:, 1]) / (after[:, 1] - polygon[:, 1])
         x = polygon[:, 0] + share * (after[:, 0] - polygon[:, 0])
-    return np.asarray((spans & (x > uv[:, :1])).sum(axis=1))
+    return np.asarray((spans & (x > uv[:, :1])).sum(axis=1), dtype=np.int64)
 
 
 def _finite(surface: Surface) -> bool:

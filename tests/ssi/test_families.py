@@ -203,13 +203,11 @@ FAMILIES = {
 }  # fmt: skip
 
 # What the code does not manage today, by (family, form), and the part of the verdict that says why: handed back as
-# unresolved, or right with a residual that it reports as too large. Never a wrong result.
-SPENT, COARSE = "the work budget is spent", "coarse: residual"
+# unresolved. Never a wrong result.
+SPENT = "the work budget is spent"
 NOT_YET = {
     ("a10 tori side by side", "given"): SPENT,  # tangent contact where four branches meet
     ("a10 tori side by side", "nurbs"): SPENT,
-    ("a11 tori across", "given"): COARSE,  # near the branch points
-    ("a11 tori across", "nurbs"): COARSE,
     ("n09 angle 6e-07", "given"): SPENT,
     ("n10 own sub-patch", "given"): "the surfaces coincide",  # free-form overlaps are not grown into regions
 }
@@ -307,5 +305,5 @@ def test_family(name: str, form: str) -> None:
     if reason is None:
         assert got == "right"
     else:  # fails as soon as it is right: then its entry goes
-        assert got.startswith(("unresolved", "coarse"))
+        assert got.startswith("unresolved")
         assert reason in got
