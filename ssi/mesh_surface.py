@@ -7,7 +7,8 @@ exact tangents, in space and in (u, v): it lies in the mesh's plane, and points 
 of the surface.
 
 Limits: existence is decided by the surface's triangulation, so what is smaller than its chord tolerance can be missed;
-the result says so and is never `complete`. A curve that crosses a seam has (u, v) that run on beyond the domain.
+the result says so and is never `complete`. The parameters of a curve that crosses a seam jump there, at a knot of
+multiplicity 4; a piece that was made of two across a seam runs on beyond the domain.
 """
 
 from __future__ import annotations
@@ -358,12 +359,13 @@ def _splines(surface: _Unrolled, pieces: _Pieces) -> tuple[NurbsCurve, NurbsCurv
     space, plane, span = _bezier(surface, pieces)
     knots = np.concatenate([[0.0], np.cumsum(span)])
     full = np.concatenate([knots[:1], np.repeat(knots, 3), knots[-1:]])
-    plane = plane.copy()
+    jump = np.zeros(len(plane) - 1, dtype=np.bool_)
     for axis in range(2):
-        # seams: where the next piece starts elsewhere in (u, v), everything after it is moved by the jump
         period = surface.period(axis)
-        if np.isfinite(period):
-            turns = np.round((plane[1:, 0, axis] - plane[:-1, 3, axis]) / period)
-            plane[1:, :, axis] -= (np.cumsum(turns) * period)[:, None]
-    nets = [np.concatenate([net[:, :3].reshape(-1, net.shape[2]), net[-1:, 3]]) for net in (space, plane)]
-    return NurbsCurve(3, full, nets[0]), NurbsCurve(3, full, nets[1])
+        if np.isfinite(period):  # seams: the next piece starts elsewhere in (u, v)
+            jump |= np.round((plane[1:, 0, axis] - plane[:-1, 3, axis]) / period) != 0.0
+    count = np.concatenate([[4], np.where(jump, 4, 3), [4]])
+    stays = np.ones(plane.shape[:2], dtype=np.bool_)
+    stays[:-1, 3] = jump
+    net = np.concatenate([space[:, :3].reshape(-1, 3), space[-1:, 3]])
+    return NurbsCurve(3, full, net), NurbsCurve(3, np.repeat(knots, count), plane[stays])
