@@ -13,21 +13,9 @@ import numpy as np
 from numba import njit
 
 from patchwright.models._compile_kernel import inner, kernel, making
+from patchwright.models._span_kernel import find_span as find_span
+from patchwright.models._span_kernel import near_span, span_table
 from patchwright.models.arrays import Array, IntArray
-
-
-@njit(cache=True, nogil=True, inline="always")
-def find_span(U: Array, p: int, n: int, u: float) -> int:
-    """The non-empty span of the domain [U[p], U[n]] that holds u; the last one at the domain's end."""
-    low = p
-    width = n - p
-    while width > 1:
-        half = width >> 1
-        low = low + half if U[low + half] <= u else low
-        width -= half
-    while low > p and U[low] == U[low + 1]:
-        low -= 1
-    return low
 
 
 @inner
@@ -224,9 +212,11 @@ def bicubic_points(U: Array, V: Array, net: Array, u: Array, v: Array) -> Array:
     out = np.empty((u.shape[0], 3))
     table_u = cubic_table(U, n, 0, 0)
     table_v = cubic_table(V, m, 0, 0)
+    spans_u, scale_u = span_table(U, 3, n, u.shape[0])
+    spans_v, scale_v = span_table(V, 3, m, u.shape[0])
     for k in range(u.shape[0]):
-        i = find_span(U, 3, n, u[k])
-        j = find_span(V, 3, m, v[k])
+        i = near_span(U, 3, spans_u, scale_u, u[k])
+        j = near_span(V, 3, spans_v, scale_v, v[k])
         a = cubic_basis(table_u, 0 if u[k] == U[i + 1] else i, 0, (u[k] - U[i]) / (U[i + 1] - U[i]))
         b = cubic_basis(table_v, 0 if v[k] == V[j + 1] else j, 0, (v[k] - V[j]) / (V[j + 1] - V[j]))
         scale = 1.0 / bicubic_sum(net, i - 3, j - 3, 3, a, b)
@@ -305,9 +295,11 @@ def scattered(
         binomial[e, 0] = 1.0
         for f in range(1, e + 1):
             binomial[e, f] = binomial[e - 1, f - 1] + binomial[e - 1, f]
+    spans_u, scale_u = span_table(U, p, n, u.shape[0])
+    spans_v, scale_v = span_table(V, q, m, u.shape[0])
     for k in range(u.shape[0]):
-        i = find_span(U, p, n, u[k])
-        j = find_span(V, q, m, v[k])
+        i = near_span(U, p, spans_u, scale_u, u[k])
+        j = near_span(V, q, spans_v, scale_v, v[k])
         if cubic:
             t_u = (u[k] - U[i]) / (U[i + 1] - U[i])
             t_v = (v[k] - V[j]) / (V[j + 1] - V[j])

@@ -1,4 +1,4 @@
-"""The command line: `patchwright check | repair | intersect | convert | run | demo`.
+"""The command line: `patchwright check | repair | intersect | convert | curves | run | demo`.
 
 Only here do errors become sentences and exit codes: 0 done, 1 defects found, refused or not converged, 2 bad usage or
 input, 3 internal failure. Heavy packages are imported inside the commands, so that `--help` answers at once.
@@ -168,6 +168,25 @@ def convert(
         write(target, assembly)
     triangles = sum(len(part.triangulation) for part in assembly.parts)
     _say(f"{source} -> {target}: {len(assembly.parts)} parts, {triangles} triangles")
+
+
+@app.command()
+def curves(
+    output: Annotated[Path | None, typer.Option("-o", "--output", help="Folder for pictures and curves.json.")] = None,
+    paper_tables: Annotated[
+        bool, typer.Option("--paper-tables", help="The tables and figures of two papers, computed beside the printed.")
+    ] = False,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Show the interpolation schemes and what each claims; with --paper-tables, the tables of their papers."""
+    from patchwright.pipelines.curves import curves_json, curves_lines, run_curves
+
+    run = run_curves(output, paper_tables=paper_tables, terminal=_terminal(quiet))
+    if json:
+        _say_json(curves_json(run.tables))
+    else:
+        _say("\n".join(curves_lines(run)))
 
 
 def _version(wanted: bool) -> None:

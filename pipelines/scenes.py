@@ -59,16 +59,21 @@ class Scene:
 
 def draw_scenes(scenes: list[Scene]) -> str | None:
     """Draw all scenes; returns None, or the sentence that says why there are no pictures."""
-    if not scenes:
-        return None
-    for scene in scenes:
-        scene.path.unlink(missing_ok=True)
-    listing = [
+    listing: list[dict[str, Any]] = [
         {"path": str(s.path), "title": s.title, "box": np.asarray(s.box).tolist(), "layers": s.layers} for s in scenes
     ]
     arrays: dict[str, Any] = {}
     for scene in scenes:
         arrays.update(scene.arrays)
+    return draw_listing(listing, arrays, [s.path for s in scenes])
+
+
+def draw_listing(listing: list[dict[str, Any]], arrays: dict[str, Any], paths: list[Path]) -> str | None:
+    """Draw pictures described by a listing and its arrays, each to its path; None or why there are none."""
+    if not listing:
+        return None
+    for path in paths:
+        path.unlink(missing_ok=True)
     with tempfile.TemporaryDirectory() as folder:
         archive = Path(folder) / "scenes.npz"
         np.savez(archive, scenes=np.array(json.dumps(listing)), **arrays)
@@ -77,7 +82,7 @@ def draw_scenes(scenes: list[Scene]) -> str | None:
             done = subprocess.run(command, capture_output=True, timeout=SECONDS, check=False)
         except subprocess.TimeoutExpired:
             return f"no pictures: drawing took longer than {SECONDS:.0f} s"
-    missing = [s.path.name for s in scenes if not s.path.exists()]
+    missing = [path.name for path in paths if not path.exists()]
     if missing:
         return f"no pictures ({', '.join(missing)}): off-screen drawing failed with exit code {done.returncode}"
     return None

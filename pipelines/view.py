@@ -2,7 +2,7 @@
 
     python -m patchwright.pipelines.view SCENES.npz
 
-The archive is made by `pictures.save_scenes`; every scene in it becomes one PNG file.
+The archive is made by `scenes.draw_listing`; every scene and every sheet of charts in it becomes one PNG file.
 """
 
 from __future__ import annotations
@@ -40,6 +40,42 @@ def draw_scene(scene: dict[str, Any], arrays: dict[str, Any], path: Path) -> Non
     if scene.get("title"):
         plotter.add_text(scene["title"], font_size=11, color="#222222", position="upper_left")
     _aim(plotter, scene)
+    beside = path.with_name(f".{path.name}.tmp.png")
+    plotter.screenshot(str(beside))
+    plotter.close()
+    beside.replace(path)
+
+
+def draw_charts(sheet: dict[str, Any], arrays: dict[str, Any], path: Path) -> None:
+    """Draw a sheet of charts off-screen and write it as PNG (beside, then renamed)."""
+    import pyvista as pv
+
+    columns, (width, height) = sheet["columns"], sheet["size"]
+    rows = -(-len(sheet["charts"]) // columns)
+    plotter = pv.Plotter(off_screen=True, window_size=[columns * width, rows * height])
+    plotter.set_background(BACKGROUND)
+    for i, chart in enumerate(sheet["charts"]):
+        row, column = divmod(i, columns)
+        axes = pv.Chart2D(
+            size=(1.0 / columns, 1.0 / rows),
+            loc=(column / columns, 1.0 - (row + 1) / rows),
+            x_label=chart["labels"][0],
+            y_label=chart["labels"][1],
+            grid=False,
+        )
+        axes.title, axes.border_color = chart["title"], BACKGROUND
+        axes.legend_visible = chart["legend"]
+        for layer in chart["layers"]:
+            x, y = arrays[layer["key"]].T
+            if layer["kind"] == "line":
+                axes.line(x, y, layer["colour"], layer["width"], layer["style"], layer["label"])
+            elif layer["kind"] == "dots":
+                axes.scatter(x, y, layer["colour"], layer["size"], "o", layer["label"])
+            else:
+                axes.bar(x, y, layer["colour"])
+                axes.x_axis.tick_locations, axes.x_axis.tick_labels = list(x), layer["names"]
+        axes.x_range, axes.y_range = chart["ranges"]
+        plotter.add_chart(axes)
     beside = path.with_name(f".{path.name}.tmp.png")
     plotter.screenshot(str(beside))
     plotter.close()
@@ -120,7 +156,8 @@ def main(archive: str) -> int:
     with np.load(archive) as data:
         arrays = {key: data[key] for key in data.files}
     for scene in json.loads(str(arrays.pop("scenes"))):
-        draw_scene(scene, arrays, Path(scene["path"]))
+        draw = draw_charts if "charts" in scene else draw_scene
+        draw(scene, arrays, Path(scene["path"]))
     return 0
 
 

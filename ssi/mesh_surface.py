@@ -127,7 +127,7 @@ def intersect_mesh_surface(
         if not far.any():
             break
         pieces = _halved(unrolled, pieces, far)
-    residual = _residual(unrolled, pieces, 9)
+    residual = _residual(surface, pieces, 9)  # without what runs on beyond a seam
     curves = []
     borders = np.searchsorted(pieces.curve, np.arange(len(found.traced) + 1))
     for i, (start, stop) in enumerate(pairwise(borders.tolist())):

@@ -1,4 +1,4 @@
-"""Random pairs of surfaces through `intersect`: no crash, no hang, no NaN, and what it returns judged where that is easy.
+"""Random pairs of surfaces through `intersect`: no crash, no hang, no NaN, and the answer judged where that is easy.
 
     python tests/fuzz_intersect.py --pairs 10000 --seed 0
 
@@ -229,7 +229,7 @@ def solved(seed: int, index: int) -> Result:
         found = intersect(a, b)
     except GeometryError as error:
         return Result(kinds, "refused", str(error), time.perf_counter() - begin)
-    except Exception as error:
+    except Exception as error:  # noqa: BLE001
         return Result(kinds, "crash", repr(error)[:200], time.perf_counter() - begin)
     seconds = time.perf_counter() - begin
     wrong = judged(a, b, found)
@@ -290,11 +290,11 @@ def main() -> None:
         kinds[got.kinds, got.state] += 1
         slow = max(slow, got.seconds)
         if got.state in ("crash", "hang", "wrong"):
-            print(f"{index}: {got.kinds}: {got.state}: {got.what} ({got.seconds:.1f} s)", flush=True)
-    print(dict(states), f"slowest {slow:.1f} s")
+            print(f"{index}: {got.kinds}: {got.state}: {got.what} ({got.seconds:.1f} s)", flush=True)  # noqa: T201
+    print(dict(states), f"slowest {slow:.1f} s")  # noqa: T201
     for (which, state), count in sorted(kinds.items()):
         if state not in ("right", "refused"):
-            print(f"{which:24}{state:12}{count}")
+            print(f"{which:24}{state:12}{count}")  # noqa: T201
 
 
 if __name__ == "__main__":

@@ -179,3 +179,26 @@ def test_a_sphere_has_its_normals_even_at_the_poles():
 
 def test_uniform_knots_have_equal_spans():
     np.testing.assert_allclose(np.diff(np.unique(uniform_knots(3, 8))), 0.2)
+
+
+@pytest.mark.parametrize("width", [1e-310, 1e-5, 1.0, 1e300])
+@pytest.mark.parametrize("start", [0.0, -3.0])
+def test_spans_are_found_among_clustered_and_repeated_knots_on_any_scale(width, start):
+    """Many parameters are looked up in a table of spans; one alone is bisected. Both give the same points."""
+    if start and start + width * 1e-9 == start:
+        pytest.skip("the knots would coincide")
+    inner = (
+        np.array([1e-9, 2e-9, 0.5, 0.5, 0.5 + 1e-12, 0.7, 0.7, 0.7, 0.999]) if start == 0.0 else np.linspace(0, 1, 9)
+    )
+    U = start + width * np.concatenate((np.zeros(4), inner, np.ones(4)))
+    U = U[:4].tolist() + sorted(x for x in U[4:-4] if U[3] < x < U[-1]) + U[-4:].tolist()
+    V = np.array([0.0, 0, 0, 1, 1, 1])
+    net = np.random.default_rng(0).normal(size=(len(U) - 4, 3, 3))
+    S = NurbsSurface((3, 2), (U, V), net)
+    knots = np.array(S.breaks[0])
+    u = np.concatenate((knots, np.nextafter(knots[1:], -np.inf), np.linspace(knots[0], knots[-1], 500)))
+    u = np.clip(u, knots[0], knots[-1])
+    many = S(u, 0.3)
+    one = np.array([S(float(x), 0.3) for x in u])
+    np.testing.assert_array_equal(many, one)
+    np.testing.assert_allclose(many, S.grid(u, np.array([0.3]))[:, 0], rtol=0, atol=1e-13)
