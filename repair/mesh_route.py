@@ -19,6 +19,8 @@ from patchwright.models.errors import GeometryError
 from patchwright.models.tolerance import Tolerance
 from patchwright.models.tree import Tree
 from patchwright.models.triangulation import Triangulation
+from patchwright.repair.block_grid import block_grid
+from patchwright.repair.blocks import Blocks, find_blocks, smallest_corner
 from patchwright.repair.cad_ground import ground_of, measured, on_model, true_entry
 from patchwright.repair.deviation import Deviation
 from patchwright.repair.faceting import faceting
@@ -81,6 +83,7 @@ def repair_mesh(
         return _refused(assembly, mended, ledger, (Problem("layout", middle, raw.diagonal, message),))
     if deviation.coverage < COVERAGE_LEAST:
         return _refused(assembly, mended, ledger, (_uncovered(deviation),))
+    blocks = find_blocks(network.layout)
     seams = measure(network)
     faces = _faces(network, mended)
     invented = float(mended.triangulation.areas[mended.origin == BRIDGED].sum() / mended.triangulation.areas.sum())
@@ -114,9 +117,9 @@ def repair_mesh(
         invented,
         (),
         Assembly(parts, unit=assembly.unit, source=assembly.source, topology=network.topology()),
-        grid=network.grid(GRID),
+        grid=block_grid(network, blocks, GRID),
         network=network,
-        figures=_figures(network, mended, seams, deviation),
+        figures=_figures(network, blocks, mended, seams, deviation),
     )
 
 
@@ -278,13 +281,16 @@ def _fitting_entry(
 
 
 def _figures(
-    network: PatchNetwork, mended: Mended, seams: Sequence[Seam], deviation: Deviation
+    network: PatchNetwork, blocks: Blocks, mended: Mended, seams: Sequence[Seam], deviation: Deviation
 ) -> dict[str, float | int | str | bool]:
     """The numbers of the report's first table."""
     smooth = np.array([s.angle for s in seams if s.kind == "smooth"] or [0.0])
     return {
         "patches": len(network),
         "control points": len(network.nets.controls),
+        "irregular vertices": network.layout.irregular_vertices,
+        "grid blocks": len(blocks),
+        "smallest block corner": smallest_corner(network.layout, blocks),
         "closed": bool(mended.closed),
         "openings kept": len(mended.openings),
         "noise": float(mended.noise),

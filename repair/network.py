@@ -10,7 +10,6 @@ import numpy as np
 from patchwright.models.arrays import Array, BoolArray, IntArray
 from patchwright.models.nurbs_curve import NurbsCurve
 from patchwright.models.nurbs_surface import NurbsSurface
-from patchwright.models.structured_grid import StructuredGrid
 from patchwright.models.topology import EdgeUse, Topology
 from patchwright.models.triangulation import Triangulation
 from patchwright.repair.edge_curves import EdgeCurves
@@ -79,16 +78,10 @@ class PatchNetwork:
         )
         return Topology(layout.vertices, tuple(curves), layout.edges, loops)
 
-    def grid(self, intervals: int) -> StructuredGrid:
-        """A multi-block grid, one block per patch, whose nodes agree across every edge bit for bit."""
-        points = self.points(intervals)
-        mark = self.invented[:, _nearest_cell(intervals)][:, :, _nearest_cell(intervals)]
-        names = tuple(f"patch-{i + 1}" for i in range(len(self)))
-        return StructuredGrid(
-            tuple(np.ascontiguousarray(p[:, :, None]) for p in points),
-            names,
-            tuple(m[:, :, None].astype(np.int64) for m in mark),
-        )
+    def invented_nodes(self, intervals: int) -> BoolArray:
+        """(m, intervals + 1, intervals + 1) which of `points` lie on surface that gap filling made."""
+        cell = _nearest_cell(intervals)
+        return self.invented[:, cell][:, :, cell]
 
     def points(self, intervals: int) -> Array:
         """(m, intervals + 1, intervals + 1, 3) equidistant points; the sides are the edge curves' own points."""

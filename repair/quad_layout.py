@@ -105,6 +105,18 @@ class QuadLayout:
         """(k, 3) polyline of an edge from its first to its second vertex."""
         return self.path_points[self.path_offsets[edge] : self.path_offsets[edge + 1]]
 
+    @property
+    def irregular_vertices(self) -> int:
+        """How many inner vertices have other than four edges."""
+        return _irregular(self.edges, self.boundary)
+
+
+def _irregular(edges: IntArray, boundary: BoolArray) -> int:
+    """How many vertices off the boundary have other than four edges."""
+    degree = np.bincount(edges.reshape(-1))
+    degree[edges[boundary]] = 4
+    return int(((degree != 4) & (degree > 0)).sum())
+
 
 def quad_layout(
     triangulation: Triangulation,
@@ -193,13 +205,10 @@ def _finish(quad_mesh: QuadMesh, features: Features, begin: float) -> QuadLayout
     own = trace_paths(quad_mesh, features)
     vertices, quads = quad_mesh.mesh.X, quad_mesh.quads
     quality = scaled_jacobians(quad_mesh)
-    degree = np.bincount(own.edges.reshape(-1), minlength=len(vertices))
-    special = np.zeros(len(vertices), dtype=bool)
-    special[own.edges[own.boundary].reshape(-1)] = True
     body = features.body
     sides = (3 * len(body) + int((features.neighbours < 0).sum())) // 2
     report = LayoutReport(
-        irregular_vertices=int((degree[~special] != 4).sum()),
+        irregular_vertices=_irregular(own.edges, own.boundary),
         min_scaled_jacobian=float(quality.min()),
         median_scaled_jacobian=float(np.median(quality)),
         folded=int((quality <= 0.0).sum()),

@@ -79,7 +79,9 @@ def test_the_grid_is_read_back_with_its_marks(study):
     from patchwright.models.io import read_grid
 
     grid = read_grid(study.folder / "grid.xyz")
-    assert len(grid.blocks) == len(study.repaired.network)
+    cells = sum((b.shape[0] - 1) * (b.shape[1] - 1) for b in grid.blocks)
+    assert cells == 64 * len(study.repaired.network)
+    assert len(grid.blocks) == study.repaired.figures["grid blocks"]
     assert grid.bounds == pytest.approx(study.repaired.grid.bounds)
 
 

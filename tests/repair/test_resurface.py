@@ -73,14 +73,13 @@ def test_scale_changes_nothing_but_the_scale(scale):
 
 def test_the_grid_agrees_node_for_node_and_the_surfaces_with_the_nets():
     network = network_of(2, 1e-3)
-    grid = network.grid(8)
-    nodes = np.concatenate([b.reshape(-1, 3) for b in grid.blocks])
-    distinct = len(np.unique(nodes, axis=0))
+    nodes = network.points(8)
+    distinct = len(np.unique(nodes.reshape(-1, 3), axis=0))
     m, e, v = len(network), len(network.layout.edges), len(network.layout.vertices)
     assert distinct == v + 7 * e + 49 * m
     t = np.linspace(0, 1, 9)
-    for surface, block in zip(network.surfaces(), grid.blocks, strict=True):
-        assert np.allclose(surface.grid(t, t), block[:, :, 0], atol=1e-14)
+    for surface, own in zip(network.surfaces(), nodes, strict=True):
+        assert np.allclose(surface.grid(t, t), own, atol=1e-14)
 
 
 def test_the_topology_runs_every_pcurve_with_its_edge():
