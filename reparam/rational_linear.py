@@ -3,8 +3,8 @@
 Source: Fuhr and Kallay, Monotone linear rational spline interpolation, CAGD 9 (1992) 313-319. A function of this kind
 is held as a `NurbsCurve` of degree 1 in R^1, two pieces for each step of the data: f(x)[..., 0]. It is C1 and
 increasing, its inverse is of the same kind, and C(f(x)) is a NURBS curve of C's own degree: exactly the same shape, run
-through at another speed. The map is C1 where C is, but the homogeneous net is only C0 at the breaks of f, so that knots there
-have the multiplicity of the degree.
+through at another speed. The map is C1 where C is, but the homogeneous net is only C0 at the breaks of f, so that knots
+there have the multiplicity of the degree.
 """
 
 from __future__ import annotations
