@@ -20,6 +20,7 @@ from patchwright.models.errors import EngineError, GeometryError
 if TYPE_CHECKING:
     from patchwright.pipelines.progress import Terminal
     from patchwright.pipelines.study import Study
+    from patchwright.repair.domain import Domain
 
 DONE, FOUND, BAD_INPUT, INTERNAL = 0, 1, 2, 3
 INTERRUPTED = "interrupted; nothing half-written was left"
@@ -53,34 +54,67 @@ Json = Annotated[bool, typer.Option("--json", help="Machine output on stdout, ev
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress.")]
 
 
+FarField = Annotated[list[str] | None, typer.Option("--farfield", help="Part that is far field (repeatable; '' none).")]
+Symmetry = Annotated[
+    list[str] | None, typer.Option("--symmetry", help="Symmetry plane: x, y, z or a planar part (repeatable).")
+]
+Fluid = Annotated[str | None, typer.Option("--fluid", help="X,Y,Z: a point in the fluid.")]
+
+
 @app.command()
 def check(
-    files: Annotated[list[Path], typer.Argument(help="Files to examine.", show_default=False)],
+    files: Annotated[list[str], typer.Argument(help="Files, folders and globs.", show_default=False)],
+    fail_on: Annotated[
+        str, typer.Option("--fail-on", help="KIND[,KIND...], error, warning or never: what makes the check fail.")
+    ] = "warning",
+    baseline: Annotated[
+        Path | None, typer.Option("--baseline", help="Defects listed in this file do not make the check fail.")
+    ] = None,
+    write_baseline: Annotated[
+        Path | None, typer.Option("--write-baseline", help="Write all defects found to this file, and pass.")
+    ] = None,
+    farfield: FarField = None,
+    symmetry: Symmetry = None,
+    fluid: Fluid = None,
     json: Json = False,
     quiet: Quiet = False,
 ) -> None:
-    """Say what is wrong with each file and where; exit code 1 when anything is."""
-    from patchwright.models.io import read
-    from patchwright.pipelines.summary import defect_lines
-    from patchwright.repair import diagnose
+    """Say what is wrong with each file and where; exit code 1 when anything counts, 2 when a file cannot be read."""
+    from patchwright.pipelines.check import FailOn, checked_json, run_check
+    from patchwright.pipelines.summary import checked_lines
 
-    terminal = _terminal(quiet)
-    results: list[dict[str, Any]] = []
-    clean = True
-    for path in files:
-        with terminal.stage(f"check {path.name}") as report:
-            report("reading", 0.0)
-            assembly = read(path)
-            report("diagnosing", 0.3)
-            diagnosis = diagnose(assembly)
-        clean &= diagnosis.clean
-        if json:
-            results.append({"file": str(path), "clean": diagnosis.clean, **diagnosis.to_json()})
-        else:
-            _say("\n".join(defect_lines(str(path), diagnosis)))
+    results = run_check(
+        files,
+        fail_on=FailOn.of(fail_on),
+        baseline=baseline,
+        write=write_baseline,
+        domain=_domain(farfield, symmetry, fluid),
+        terminal=_terminal(quiet),
+    )
+    for result in results:
+        if result.error:
+            _fail(result.error, BAD_INPUT)
+        elif not json:
+            _say("\n".join(checked_lines(result)))
     if json:
-        _say_json(results[0] if len(results) == 1 else results)
-    raise typer.Exit(DONE if clean else FOUND)
+        told = [checked_json(result) for result in results]
+        _say_json(told[0] if len(told) == 1 else told)
+    if any(result.error for result in results):
+        raise typer.Exit(INTERNAL if any(result.internal for result in results) else BAD_INPUT)
+    raise typer.Exit(FOUND if any(result.failing for result in results) else DONE)
+
+
+def _domain(farfield: list[str] | None, symmetry: list[str] | None, fluid: str | None) -> Domain | None:
+    """The flow domain of the command line; an empty far-field name says that there is none."""
+    from patchwright.repair.domain import Domain, place_of
+
+    if not (farfield or symmetry or fluid):
+        return None
+    return Domain(
+        far_field=tuple(name for name in farfield if name) if farfield else None,
+        symmetry=tuple(symmetry) if symmetry else None,
+        fluid=place_of(fluid, "--fluid") if fluid else None,
+    )
 
 
 @app.command()

@@ -6,30 +6,75 @@ import math
 from dataclasses import asdict
 from typing import Any
 
+from patchwright.pipelines.check import Checked
 from patchwright.pipelines.study import Study
 from patchwright.repair.deviation import Spread
 from patchwright.repair.diagnosis import Diagnosis
 from patchwright.repair.result import Repaired, Verdict
 
 MOST_LINES = 12
+COUNTS = (
+    ("triangles", "triangles"),
+    ("faces", "faces"),
+    ("open_edges", "open edges"),
+    ("non_manifold_edges", "multiply connected edges"),
+    ("components", "unconnected parts"),
+    ("collapsed_faces", "collapsed"),
+    ("zero_area_faces", "degenerate"),
+    ("duplicate_faces", "duplicate"),
+    ("needles", "needle"),
+    ("orientation_zones", "orientation zones"),
+    ("self_intersecting_faces", "self-intersecting faces"),
+    ("invalid_faces", "invalid faces"),
+    ("gaps", "gaps"),
+    ("holes", "holes"),
+    ("openings", "openings"),
+)
+
+
+def checked_lines(result: Checked) -> list[str]:
+    """One file's check: the diagnosis, then what counts against the baseline."""
+    assert result.diagnosis is not None
+    lines = defect_lines(str(result.file), result.diagnosis)
+    if result.known or result.gone:
+        lines.append(
+            f"  against the baseline: {len(result.failing)} new that count, {len(result.known)} known, "
+            f"{result.gone} gone"
+        )
+        lines += [f"  new      {d.kind:<18} at {_place(d.where)}  {d.message}" for d in result.failing[:MOST_LINES]]
+    return lines
 
 
 def defect_lines(name: str, diagnosis: Diagnosis) -> list[str]:
-    """The diagnosis of one file: a headline, then the defects, gravest first."""
+    """The diagnosis of one file: a headline, the counts, the free-edge curve, then the defects, gravest first."""
     if diagnosis.clean:
         lines = [f"{name}: clean"]
     else:
         errors = sum(d.severity == "error" for d in diagnosis.defects)
         warnings = sum(d.severity == "warning" for d in diagnosis.defects)
-        lines = [f"{name}: {errors} errors, {warnings} warnings"]
+        lines = [f"{name}: {_plural(errors, 'error')}, {_plural(warnings, 'warning')}"]
+    lines += count_lines(diagnosis)
     rank = {"error": 0, "warning": 1, "info": 2}
     ordered = sorted(diagnosis.defects, key=lambda d: (rank[d.severity], -d.size))
     for defect in ordered[:MOST_LINES]:
-        x, y, z = defect.where
-        lines.append(f"  {defect.severity:<7} {defect.kind:<18} at ({x:.6g}, {y:.6g}, {z:.6g})  {defect.message}")
+        lines.append(f"  {defect.severity:<7} {defect.kind:<18} at {_place(defect.where)}  {defect.message}")
     if len(ordered) > MOST_LINES:
         lines.append(f"  and {len(ordered) - MOST_LINES} more; --json lists all")
     return lines
+
+
+def count_lines(diagnosis: Diagnosis) -> list[str]:
+    """The counts other tools tell as well, and how many free edges remain at which tolerance."""
+    told = diagnosis.summary
+    words = [f"{told[key]} {word}" for key, word in COUNTS if told.get(key) is not None]
+    lines = [f"  {', '.join(words)}"] if words else []
+    curve = told.get("free_edges_by_tolerance") or []
+    if curve and curve[0]["free_edges"]:
+        steps = ", ".join(f"{row['free_edges']} at {row['share']:.0e}" if row["share"] else str(row["free_edges"])
+                          for row in curve)  # fmt: skip
+        lines.append(f"  free edges by tolerance (shares of the diagonal): {steps}")
+        lines.append(f"  {told['free_edge_reading']}")
+    return lines + [f"  domain: {sentence}" for sentence in told.get("domain") or ()]
 
 
 def study_lines(study: Study) -> list[str]:
@@ -120,6 +165,15 @@ def _spread(spread: Spread) -> str:
         f"median {spread.median:.3g}, 99 % {spread.p99:.3g}, largest {spread.largest:.3g}, "
         f"{100.0 * spread.coverage:.2f} % within {spread.tolerance:.3g}"
     )
+
+
+def _place(where: Any) -> str:
+    x, y, z = where
+    return f"({x:.6g}, {y:.6g}, {z:.6g})"
+
+
+def _plural(count: int, word: str) -> str:
+    return f"{count} {word}" if count == 1 else f"{count} {word}s"
 
 
 def _short(value: Any) -> str:

@@ -10,6 +10,7 @@ from typing import Any, Literal
 import numpy as np
 
 from patchwright.models.arrays import Array, frozen
+from patchwright.repair.fingerprint import Fingerprint, fingerprint
 
 Severity = Literal["error", "warning", "info"]
 
@@ -51,7 +52,7 @@ class Defect:
     count : how many edges, triangles or faces it is made of
     message : one sentence with numbers
     box : (2, 3) its bounding box
-    id : unique in its diagnosis, "kind-number"
+    id : "kind-hash", unique in its diagnosis and the same for the same place in a re-ordered model (`fingerprint`)
     """
 
     kind: str
@@ -67,6 +68,11 @@ class Defect:
     def __post_init__(self) -> None:
         object.__setattr__(self, "where", frozen(self.where, np.float64))
         object.__setattr__(self, "box", frozen(self.box, np.float64))
+
+    @property
+    def fingerprint(self) -> Fingerprint:
+        """What it is known by again in a revised model."""
+        return fingerprint(self.kind, self.where, self.size, self.parts)
 
     def to_json(self) -> dict[str, Any]:
         """The same as plain values."""

@@ -9,7 +9,7 @@ import numpy as np
 from patchwright.models.arrays import Array, IntArray
 from patchwright.models.nurbs_curve import NurbsCurve
 from patchwright.models.topology import EdgeUse, Topology
-from patchwright.repair.checks.edges import SHARES
+from patchwright.repair.checks.edges import SHARES, reading
 from patchwright.repair.checks.examination import Examination, box_of
 from patchwright.repair.checks.regions import plural
 from patchwright.repair.checks.registry import Finding, check
@@ -35,11 +35,13 @@ def cad_rims(exam: Examination) -> Finding:
     left = [use for use, near in zip(uses, sewn, strict=True) if not near]
     chains = _chains(exam, topology, left)
     limits = np.array(SHARES) * exam.diagonal
+    curve: list[dict[str, float | int]] = [
+        {"share": share, "distance": float(limit), "free_edges": int(np.count_nonzero(reach > limit))}
+        for share, limit in zip(SHARES, limits, strict=True)
+    ]
     figures: dict[str, Any] = {
-        "free_edges_by_tolerance": [
-            {"share": share, "distance": float(limit), "free_edges": int(np.count_nonzero(reach > limit))}
-            for share, limit in zip(SHARES, limits, strict=True)
-        ],
+        "free_edges_by_tolerance": curve,
+        "free_edge_reading": reading(curve),
         "open_edges_after_sewing": len(left),
         "rims": len(chains),
     }
@@ -169,12 +171,12 @@ def _components(exam: Examination, topology: Topology, chains: list[Chain]) -> t
 
 def _defect(exam: Examination, rims: tuple[Rim, ...], chains: list[Chain], group: list[int], edges: RimEdges) -> Defect:
     some = [rims[i] for i in group]
-    kind, severity, size, message = describe(exam, some)
     centre = np.average([rim.centre for rim in some], axis=0, weights=[rim.perimeter for rim in some])
     faces = sorted({face for i in group for face, _ in chains[i]})
     parts = tuple(dict.fromkeys(exam.assembly.parts[face].name for face in faces))
     count = sum(len(chains[i]) for i in group)
     points = np.concatenate([edges.start[rim.loop] for rim in some])
+    kind, severity, size, message = describe(exam, some, points, parts)
     return Defect(kind, severity, centre, size, parts, count, message, box_of(points))
 
 

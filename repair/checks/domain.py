@@ -1,105 +1,74 @@
-"""Domain: what looks like a far field, a symmetry plane, or a wrong unit; suspicions that nothing acts on by itself."""
+"""Domain: far field and symmetry planes, named or suspected, and units that cannot be right."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from patchwright.models.arrays import Array, IntArray
-from patchwright.repair.checks.examination import Examination
+from patchwright.models.arrays import Array
+from patchwright.repair.checks.examination import Examination, box_of
 from patchwright.repair.checks.registry import Finding, check
 from patchwright.repair.diagnosis import Defect
+from patchwright.repair.domain import AXES
+from patchwright.repair.surroundings import PLANE, SCALED
 
-FAR = 4.0  # times the diagonal of everything else: a body that large around it is a far field
-PLANE = 1e-5  # of the diagonal: how flat a symmetry plane's rim or face is
 PLANE_SHARE = 0.5  # of the model's extent that rims or faces on a symmetry plane must cover in one direction
+AT_ZERO = 1e-3  # of the diagonal: halves of a model are cut where a coordinate is zero, or nearly
 SENSIBLE = (1e-3, 1e3)  # metres: diagonals of real things that flow goes round
 METRES = {"mm": 1e-3, "cm": 1e-2, "dm": 0.1, "m": 1.0, "km": 1e3, "in": 0.0254, "ft": 0.3048}
+ALIKE = 5.0  # times: parts of one model, brought to one unit, are that near in size
 
 
 @check("domain", looks="any", kinds=("far-field", "unit"))
 def domain(exam: Examination) -> Finding:
-    """Far field, symmetry plane, unit."""
-    far, names = _far_field(exam)
+    """Far field, symmetry planes, units; suspicions that nothing acts on unless the user named them."""
+    around = exam.surroundings
     plane = _symmetry(exam)
-    figures = {"far_field": names, "symmetry_plane": plane}
-    return Finding((*far, *_unit(exam)), figures)
+    said = [*around.reasons]
+    if plane is not None and not around.planes:
+        where = f"{plane['axis']} = {plane['value']:.4g}"
+        said.append(f"{where} looks like a symmetry plane: {plane['why']}; name it with --symmetry")
+    figures = {
+        "far_field": list(around.far_field),
+        "symmetry_plane": plane,
+        "symmetry": [{"plane": p.name, "part": p.part, "reason": p.reason} for p in around.planes],
+        "domain": said,
+    }
+    return Finding((*_far_field(exam), *_unit(exam), *_mixed_units(exam)), figures)
 
 
-def _pieces(exam: Examination) -> tuple[Array, Array, IntArray, list[tuple[str, ...]]]:
-    """Boxes (p, 3), (p, 3), triangle counts and part names of the pieces: CAD faces or connected components."""
-    if exam.assembly.is_cad:
-        parts = [part for part in exam.assembly.parts if len(part.triangulation)]
-        bounds = np.array([part.triangulation.bounds for part in parts]).reshape(-1, 2, 3)
-        counts = np.array([len(part.triangulation) for part in parts], dtype=np.int64)
-        return bounds[:, 0], bounds[:, 1], counts, [(part.name,) for part in parts]
-    label = exam.component
-    order = np.argsort(label, kind="stable")
-    counts = np.bincount(label)
-    starts = np.concatenate([[0], np.cumsum(counts)[:-1]]).astype(np.int64)
-    corners = exam.body.corners[order]
-    low = np.minimum.reduceat(corners.min(axis=1), starts)
-    high = np.maximum.reduceat(corners.max(axis=1), starts)
-    tags = exam.body.tags
-    names: list[tuple[str, ...]] = [()] * len(counts)
-    if tags is not None:
-        names = [(exam.raw.tag_names[k],) for k in tags[order[starts]]]
-    return low, high, counts, names
-
-
-def _far_field(exam: Examination) -> tuple[list[Defect], list[str]]:
-    """Pieces that reach far around all smaller ones: split the pieces by size where the size jumps most."""
-    if not exam.assembly.is_cad and not len(exam.body):
-        return [], []
-    low, high, counts, names = _pieces(exam)
-    if len(low) < 2:
-        return [], []
-    size = np.linalg.norm(high - low, axis=1)
-    order = np.argsort(size)
-    # what the pieces up to each size span together
-    reach_low = np.minimum.accumulate(low[order])
-    reach_high = np.maximum.accumulate(high[order])
-    inner = np.linalg.norm(reach_high - reach_low, axis=1)
-    jump = size[order][1:] / np.maximum(inner[:-1], np.finfo(float).tiny)
-    k = int(np.argmax(jump))
-    if jump[k] < FAR:
-        return [], []
-    outer = order[k + 1 :]
-    outer_low, outer_high = low[outer].min(axis=0), high[outer].max(axis=0)
-    slack = PLANE * float(np.linalg.norm(outer_high - outer_low))
-    if (reach_low[k] < outer_low - slack).any() or (reach_high[k] > outer_high + slack).any():
-        return [], []
-    box = np.stack([outer_low, outer_high])
-    parts = tuple(dict.fromkeys(name for i in outer for name in names[i]))
-    reach = float(np.linalg.norm(outer_high - outer_low))
-    message = (
-        f"{len(outer)} of {len(size)} pieces look like a far field: they reach {reach:.3g} around a model of "
-        f"{inner[k]:.3g}; tolerances should come from the model alone"
-    )
-    count = int(counts[outer].sum())
-    return [Defect("far-field", "info", box.mean(axis=0), reach, parts, count, message, box)], list(parts)
+def _far_field(exam: Examination) -> list[Defect]:
+    """What bounds the domain from outside, as one fact."""
+    around = exam.surroundings
+    own = np.flatnonzero(around.aside)
+    if not len(own):
+        return []
+    box = box_of(exam.raw.corners[own])
+    reach = float(np.linalg.norm(box[1] - box[0]))
+    message = f"{'; '.join(around.reasons)}; tolerances come from the model alone, {exam.diagonal:.3g} large"
+    return [Defect("far-field", "info", box.mean(axis=0), reach, exam.parts_of(own), len(own), message, box)]
 
 
 def _symmetry(exam: Examination) -> dict[str, float | str] | None:
-    """The coordinate plane that a large planar rim lies on, with the model on one side only."""
-    mesh = exam.raw
-    if not len(mesh):
+    """The coordinate plane that a large planar rim or face lies on, with the model on one side only."""
+    body = exam.raw.take(~exam.surroundings.aside) if exam.surroundings.aside.any() else exam.raw
+    if not len(body):
         return None
-    low, high = mesh.bounds
+    low, high = body.corners.min(axis=(0, 1)), body.corners.max(axis=(0, 1))
     slack = PLANE * exam.diagonal
     rim = _rim_segments(exam)
     length = np.linalg.norm(rim[:, 1] - rim[:, 0], axis=1)
     best: tuple[float, dict[str, float | str]] | None = None
-    for axis, name in enumerate("xyz"):
+    for axis, name in enumerate(AXES):
         for value in (low[axis], high[axis]):
             on = (np.abs(rim[:, :, axis] - value) <= slack).all(axis=1)
             along = float(length[on].sum())
-            # halves of a model are cut where a coordinate is zero, or nearly
-            if abs(value) > 1e-3 * exam.diagonal or along <= slack or (best is not None and along <= best[0]):
+            if abs(value) > AT_ZERO * exam.diagonal or along <= slack or (best is not None and along <= best[0]):
                 continue
             span = np.ptp(rim[on].reshape(-1, 3), axis=0) / np.maximum(high - low, np.finfo(float).tiny)
             share = float(np.delete(span, axis).max())
             if share >= PLANE_SHARE:
-                best = along, {"axis": name, "value": float(value), "share": share}
+                why = f"free edges over {share:.0%} of the model lie in it and everything is on one side"
+                best = along, {"axis": name, "value": float(value), "share": share, "why": why}
     return None if best is None else best[1]
 
 
@@ -128,3 +97,57 @@ def _unit(exam: Examination) -> list[Defect]:
     message = f"the model is {metres:.3g} m across if its unit is {exam.assembly.unit}: the unit is probably wrong"
     box = np.stack([low, high])
     return [Defect("unit", "warning", box.mean(axis=0), exam.diagonal, (), len(exam.assembly.parts), message, box)]
+
+
+def _mixed_units(exam: Examination) -> list[Defect]:
+    """Bodies (or parts) hundreds of times larger than the others, that would be of their size in another unit.
+
+    Small parts on a large model are no suspicion: brought to the model's size they would lie elsewhere.
+    """
+    names, low, high = _bodies(exam)
+    if len(names) < 2:
+        return []
+    size = np.linalg.norm(high - low, axis=1)
+    order = np.argsort(size)
+    order = order[size[order] > 0.0]
+    jump = size[order][1:] / size[order][:-1]
+    if not len(jump) or jump.max() < SCALED / ALIKE:
+        return []
+    k = int(np.argmax(jump))
+    small, large = order[: k + 1], order[k + 1 :]
+    factor, words = min(_FACTORS, key=lambda entry: abs(np.log(entry[0] * size[small].max() / size[large].max())))
+    ratio = factor * size[small].max() / size[large].max()
+    if not 1.0 / ALIKE <= ratio <= ALIKE:
+        return []
+    # in one unit, both groups must lie near each other, and nearer than they do now in shares of their size
+    boxes = [np.stack([low[g].min(axis=0), high[g].max(axis=0)]) for g in (small, large)]
+    scaled = factor * boxes[0]
+    apart = np.maximum(0.0, np.maximum(scaled[0] - boxes[1][1], boxes[1][0] - scaled[1]))
+    if np.linalg.norm(apart) > 0.5 * size[large].max():
+        return []
+    few = small if len(small) <= len(large) else large
+    box = boxes[0] if few is small else boxes[1]
+    some = tuple(dict.fromkeys(names[i] for i in few))
+    parts = ", ".join(some[:5]) + (", …" if len(some) > 5 else "")
+    message = (
+        f"{parts}: {jump[k]:.4g} times {'smaller' if few is small else 'larger'} than the next of the other parts; "
+        f"with {words} all would be alike in size and place, so the units are probably mixed"
+    )
+    extent = float(np.linalg.norm(box[1] - box[0]))
+    return [Defect("unit", "warning", box.mean(axis=0), extent, some, len(few), message, box)]
+
+
+_FACTORS = ((1000.0, "millimetres and metres told apart"), (304.8, "millimetres and feet told apart"),
+            (100.0, "centimetres and metres told apart"))  # fmt: skip
+
+
+def _bodies(exam: Examination) -> tuple[list[str], Array, Array]:
+    """Names and boxes of the bodies of CAD faces, or of the parts of a mesh."""
+    groups: dict[str, list[Array]] = {}
+    for i, part in enumerate(exam.assembly.parts):
+        if len(part.triangulation):
+            key = (part.body or "faces without a body") if exam.assembly.is_cad else part.name or f"part {i + 1}"
+            groups.setdefault(key, []).append(np.asarray(part.triangulation.bounds))
+    low = np.array([np.min([b[0] for b in some], axis=0) for some in groups.values()]).reshape(-1, 3)
+    high = np.array([np.max([b[1] for b in some], axis=0) for some in groups.values()]).reshape(-1, 3)
+    return list(groups), low, high

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from patchwright.models.arrays import BoolArray, IntArray
+from patchwright.models.tolerance import ROUND_OFF_SHARE
 from patchwright.repair.checks.examination import Examination, box_of
 from patchwright.repair.checks.regions import plural, regional
 from patchwright.repair.checks.registry import Finding, check
@@ -18,11 +19,13 @@ def edges(exam: Examination) -> Finding:
     """Unmerged vertices, edges with three triangles or more, and the free-edge curve."""
     open_edges = exam.open_edges
     many = exam.adjacency.non_manifold
+    curve = _curve(exam)
     figures = {
         "open_edges": open_edges,
         "non_manifold_edges": int(np.count_nonzero(many)),
         "watertight": open_edges == 0 and not bool(many.any()) and len(exam.raw) > 0,
-        "free_edges_by_tolerance": _curve(exam),
+        "free_edges_by_tolerance": curve,
+        "free_edge_reading": reading(curve),
         "weld_distance": exam.weld_distance[0],
         "weld_reason": exam.weld_distance[1],
         "open_edges_after_welding": int(np.count_nonzero(exam.body_adjacency.free)),
@@ -40,6 +43,18 @@ def _curve(exam: Examination) -> list[dict[str, float | int]]:
         {"share": share, "distance": float(distance), "free_edges": int(count)}
         for share, distance, count in zip(SHARES, distances, counts, strict=True)
     ]
+
+
+def reading(curve: list[dict[str, float | int]]) -> str:
+    """What a free-edge curve says: cracks of round-off vanish by `ROUND_OFF`, gaps and openings stay."""
+    first, last = int(curve[0]["free_edges"]), int(curve[-1]["free_edges"])
+    early = int(next(row["free_edges"] for row in curve if row["share"] >= ROUND_OFF_SHARE))
+    if not first:
+        return "no edge is free"
+    return (
+        f"{first - early} of {first} free edges are cracks of round-off (closed by {ROUND_OFF_SHARE:.0e} of the "
+        f"diagonal), {early - last} close between there and {SHARES[-1]:.0e}, {last} are wider gaps or openings"
+    )
 
 
 def _unmerged(exam: Examination) -> tuple[Defect, ...]:

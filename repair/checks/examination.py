@@ -17,6 +17,7 @@ from patchwright.models.triangulation import Triangulation
 if TYPE_CHECKING:
     from patchwright.repair.orient import Oriented
     from patchwright.repair.rims import Rim
+    from patchwright.repair.surroundings import Surroundings
 
 SMALL_OPENING = 0.05  # of the square root of a component's area: it bounds a body all the same
 
@@ -32,6 +33,7 @@ class Examination:
 
     assembly: Assembly
     tolerance: Tolerance
+    surroundings: Surroundings
 
     @cached_property
     def raw(self) -> Triangulation:
@@ -170,8 +172,8 @@ class Examination:
 
     @cached_property
     def diagonal(self) -> float:
-        """Diagonal of the model's box."""
-        return self.assembly.diagonal
+        """Diagonal of the model's box, without what bounds the flow domain from outside."""
+        return self.surroundings.body_size(self.assembly).diagonal
 
     def parts_of(self, triangles: IntArray) -> tuple[str, ...]:
         """Names of the parts some triangles (indices into `raw`) lie in."""

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from patchwright.models.arrays import Array, BoolArray, IntArray
-from patchwright.models.triangulation import Triangulation
+from patchwright.models.arrays import BoolArray, IntArray
 from patchwright.repair.checks.examination import Examination, box_of
 from patchwright.repair.checks.regions import plural, regional
 from patchwright.repair.checks.registry import Finding, check
 from patchwright.repair.diagnosis import Defect, Severity
+from patchwright.repair.untangle import winding
 
 
 @check("orientation", looks="mesh", kinds=("flipped",))
@@ -35,27 +35,31 @@ def orientation(exam: Examination) -> Finding:
         exam, "flipped", "error", exam.body.triangles[index], exam.body.corners[index], exam.body_index[index], say,
         labels=np.unique(zones[index], return_inverse=True)[1].astype(np.int64),
     )  # fmt: skip
-    defects += _bodies(exam, whole & ~cavity & _closed(exam, parts), "error", "faces inward: the body is inside out")
+    outer = _outer(exam, parts)
+    inward = whole & ~cavity & _closed(exam, parts)
+    defects += _bodies(exam, inward & ~outer, "error", "faces inward: the body is inside out")
+    defects += _bodies(exam, inward & outer, "info", "faces inward round the model: the fluid's outer bound")
     defects += _bodies(exam, whole & cavity, "info", "faces inward inside another body: a cavity")
     defects += _bodies(exam, oriented.one_sided, "error", "is one-sided: no orientation is consistent")
     figures = {
         "inconsistent_edges": int(np.count_nonzero(exam.adjacency.inconsistent)),
         "orientation_zones": int(zones.max()) + 1,
-        "flipped_faces": int(np.count_nonzero(mixed) + total[whole & ~cavity].sum()),
+        "flipped_faces": int(np.count_nonzero(mixed) + total[whole & ~cavity & ~outer].sum()),
         "volume": oriented.triangulation.volume
-        if exam.component_closed.all() and not cavity.any()
-        else _volume(exam, cavity),
+        if exam.component_closed.all() and not (cavity | outer).any()
+        else _volume(exam, cavity, outer),
     }
     return Finding(tuple(defects), figures)
 
 
-def _volume(exam: Examination, cavity: BoolArray) -> float | None:
-    """Enclosed volume with cavities taken off; None while something is open."""
+def _volume(exam: Examination, cavity: BoolArray, outer: BoolArray) -> float | None:
+    """Enclosed volume with cavities taken off, without the domain's outer bounds; None while something is open."""
     if not exam.component_closed.all():
         return None
     body = exam.oriented.triangulation
     hollow = cavity[exam.oriented.components]
-    return body.take(~hollow).volume - body.take(hollow).volume
+    solid = ~hollow & ~outer[exam.oriented.components]
+    return body.take(solid).volume - body.take(hollow).volume
 
 
 def _closed(exam: Examination, parts: int) -> BoolArray:
@@ -91,23 +95,14 @@ def _cavities(exam: Examination, whole: BoolArray) -> BoolArray:
         return cavity
     _, first = np.unique(component, return_index=True)
     centre = body.corners[first[inner]].mean(axis=1)
-    cavity[inner] = [_winding(outside, point) > 0.5 for point in centre]
+    cavity[inner] = [winding(outside.corners, point) > 0.5 for point in centre]
     return cavity
 
 
-def _winding(body: Triangulation, point: Array) -> float:
-    """Winding number of a closed body around a point: the sum of the solid angles (Van Oosterom and Strackee 1983)."""
-    local = body.corners - point
-    length = np.linalg.norm(local, axis=2)
-    a, b, c = np.moveaxis(local, 1, 0)
-    six = np.einsum("ij,ij->i", a, np.cross(b, c))
-    under = (
-        length.prod(axis=1)
-        + np.einsum("ij,ij->i", a, b) * length[:, 2]
-        + np.einsum("ij,ij->i", b, c) * length[:, 0]
-        + np.einsum("ij,ij->i", c, a) * length[:, 1]
-    )
-    return float(np.arctan2(six, under).sum() / (2.0 * np.pi))
+def _outer(exam: Examination, parts: int) -> BoolArray:
+    """(c,) components that bound the flow domain from outside: those face the fluid when they face inward."""
+    aside = exam.surroundings.aside[exam.body_index]
+    return np.asarray(np.bincount(exam.oriented.components, weights=aside, minlength=parts) > 0)
 
 
 def _bodies(exam: Examination, which: BoolArray, severity: Severity, what: str) -> list[Defect]:

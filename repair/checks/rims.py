@@ -57,8 +57,20 @@ def rim_groups(rims: tuple[Rim, ...]) -> list[list[int]]:
     return [group.tolist() for group in np.split(order, ends[:-1])]
 
 
-def describe(exam: Examination, some: list[Rim]) -> tuple[str, Severity, float, str]:
-    """Kind, severity, size and message of a group of rims."""
+def describe(
+    exam: Examination, some: list[Rim], points: Array, parts: tuple[str, ...]
+) -> tuple[str, Severity, float, str]:
+    """Kind, severity, size and message of a group of rims with their points (n, 3); what is planned is "info"."""
+    kind, severity, size, message = _judged(exam, some)
+    if planned := exam.surroundings.planned(points, exam.tolerance.fit):
+        across = max(rim.diameter for rim in some)
+        return "opening", "info", across, f"a planned opening {exam.length(across)} across: {planned}"
+    if kind == "gap" and (kept := exam.surroundings.keeps_gaps(parts)):
+        return kind, "info", size, f"{message}; {kept}"
+    return kind, severity, size, message
+
+
+def _judged(exam: Examination, some: list[Rim]) -> tuple[str, Severity, float, str]:
     first = max(some, key=lambda rim: rim.perimeter)
     if first.kind == "opening":
         if first.overlaps is not None:
@@ -84,13 +96,14 @@ def describe(exam: Examination, some: list[Rim]) -> tuple[str, Severity, float, 
 
 def _defect(exam: Examination, found: tuple[Rim, ...], group: list[int], points: Array) -> Defect:
     some = [found[i] for i in group]
-    kind, severity, size, message = describe(exam, some)
     loops: IntArray = np.concatenate([rim.loop for rim in some])
     weights = np.array([rim.perimeter for rim in some])
     centre = np.average([rim.centre for rim in some], axis=0, weights=weights if weights.sum() > 0 else None)
     triangles = exam.body_index[np.concatenate([rim.triangles for rim in some])]
+    parts = exam.parts_of(triangles)
+    kind, severity, size, message = describe(exam, some, points[loops], parts)
     edges = sum(len(rim.triangles) for rim in some)
-    return Defect(kind, severity, centre, size, exam.parts_of(triangles), edges, message, box_of(points[loops]))
+    return Defect(kind, severity, centre, size, parts, edges, message, box_of(points[loops]))
 
 
 def _coincident(exam: Examination, found: tuple[Rim, ...]) -> list[bool]:
