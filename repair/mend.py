@@ -2,8 +2,8 @@
 
 The stages, each of which changes as little as it can and writes down what it did: weld the copies of a point within the
 distance the data shows, drop collapsed and doubled triangles, make patch seams conform, take apart what too many
-triangles share, orient, bridge gaps and holes, unite bodies that overlap. Corners of kept triangles move by welding
-only. What cannot be mended is a `Problem` with its place, never an exception.
+triangles share, orient, trim sheets that run past each other, bridge gaps and holes, unite bodies that overlap. Corners
+of kept triangles move by welding only. What cannot be mended is a `Problem` with its place, never an exception.
 """
 
 from __future__ import annotations
@@ -20,10 +20,12 @@ from patchwright.models.errors import ParameterError
 from patchwright.models.tolerance import Tolerance
 from patchwright.models.triangulation import Triangulation
 from patchwright.repair.crossings import CROSSING, crossing_pairs
+from patchwright.repair.decisions import Decisions
 from patchwright.repair.mend_cure import cure
 from patchwright.repair.mend_gaps import bridge_gaps
+from patchwright.repair.mend_openings import unite_as_decided
+from patchwright.repair.mend_overlaps import trim_overlaps
 from patchwright.repair.mend_seams import clean, conform_seams, orient_bodies, weld_copies
-from patchwright.repair.mend_union import unite
 from patchwright.repair.mended import BRIDGED, CUT, KEPT, Action, Dropped, Mended, Problem, Work, middle
 
 Progress = Callable[[str, float], None]
@@ -36,9 +38,12 @@ def mend(
     tolerance: Tolerance,
     *,
     openings: Literal["keep", "close"] = "keep",
+    decisions: Decisions | None = None,
     progress: Progress | None = None,
 ) -> Mended:
     """Mend a triangulation; `progress(stage, share done)` is called as the stages go by.
+
+    `decisions` name the gaps, openings and scraps that stay as they are.
 
     Raises
     ------
@@ -48,9 +53,9 @@ def mend(
         raise ParameterError(f"openings must be 'keep' or 'close', got {openings!r}")
     tell = progress if progress is not None else _silent
     count = len(triangulation)
-    work = Work(
-        triangulation, replace(triangulation, uv=None), np.arange(count), np.zeros(count, dtype=np.int64), tolerance
-    )
+    bare = replace(triangulation, uv=None)
+    nothing = np.zeros(count, dtype=np.int64)
+    work = Work(triangulation, bare, np.arange(count), nothing, tolerance, decisions=decisions)
     if not count:
         work.problems.append(Problem("empty", np.zeros(3), 0.0, "there are no triangles to mend"))
         return _result(work, ())
@@ -59,16 +64,17 @@ def mend(
         ("clean", clean),
         ("conform", conform_seams),
         ("orient", orient_bodies),
+        ("trim", trim_overlaps),
     )
     for at, (name, stage) in enumerate(stages):
-        tell(name, 0.1 * at)
+        tell(name, 0.08 * at)
         stage(work)
     tell("bridge", 0.4)
     bridge_gaps(work)
     tell("cure", 0.6)
     cure(work)
     tell("unite", 0.7)
-    kept = unite(work, openings)
+    kept = unite_as_decided(work, openings)
     tell("verify", 0.9)
     _verify(work)
     result = _result(work, kept)

@@ -8,6 +8,7 @@ from patchwright.models.adjacency import Adjacency
 from patchwright.models.arrays import BoolArray
 from patchwright.models.tolerance import Tolerance
 from patchwright.repair.bridge import Border, Bridge, borders_of, bridge, facing_pairs, inner_share
+from patchwright.repair.mend_decided import free_to_drop, undecided
 from patchwright.repair.mended import STRAY_SHARE, Action, Work
 from patchwright.repair.orient import orient
 from patchwright.repair.rims import Rim, classify_rims
@@ -15,6 +16,7 @@ from patchwright.repair.rims import Rim, classify_rims
 STRAY = 6  # triangles: an open scrap of no more, and of next to no area, belongs to nothing
 SLIVER = 10.0  # fit tolerances: a rim this narrow on average is a seam that does not match, not an opening
 SHORT = 8  # edges: a gap's rim this short whose partner is gone is a hole
+HOLE = 0.5  # length of the mean unit normal along a rim: above it the rim is round a hole, not round an end
 ROUNDS = 4  # filling one rim may leave another that can be filled now
 
 
@@ -33,6 +35,7 @@ def bridge_gaps(work: Work, opened: BoolArray | None = None) -> None:
             fresh[: len(opened)] = opened
             forced = {k for k, border in enumerate(borders) if fresh[border.vertices].mean() > 0.5}
             singles = sorted(set(singles) | (forced - paired))
+        singles, pairs = undecided(work, borders, singles, pairs, "bridge")
         if not fill(work, borders, singles, pairs, "bridge"):
             break
     _drop_strays(work)
@@ -43,8 +46,8 @@ def _plan(
 ) -> tuple[list[int], list[tuple[int, int]]]:
     """Which borders are filled by themselves and which are joined in pairs; the others are openings.
 
-    A pair is joined where that takes less surface than closing each by itself: two small holes side by side are not
-    the ends of a tunnel.
+    A pair is joined, except where the surface goes on across each rim by itself and closing both takes less surface:
+    two small holes side by side are not the ends of a tunnel.
     """
     border_of = {border.vertices.tobytes(): k for k, border in enumerate(borders)}
     partner = np.full(len(borders), -1, dtype=np.int64)
@@ -55,7 +58,7 @@ def _plan(
             continue
         other = -1 if rim.partner is None else border_of.get(rims[rim.partner].loop.tobytes(), -1)
         if rim.kind == "gap" and rim.partner != own and other >= 0:
-            if _cap_area(borders[k]) + _cap_area(borders[other]) < _strip_area(borders[k], borders[other], rim.width):
+            if _two_holes(borders[k], borders[other], rim.width):
                 singles.append(k)
                 continue
             partner[k] = other
@@ -74,12 +77,17 @@ def _plan(
     return singles, pairs
 
 
-def _cap_area(border: Border) -> float:
-    return 0.5 * border.width * float(border.lengths.sum())
+def _two_holes(one: Border, other: Border, width: float) -> bool:
+    """Whether two rims that face each other across `width` are rather two holes side by side."""
+    lengths = [float(border.lengths.sum()) for border in (one, other)]
+    caps = sum(0.5 * border.width * length for border, length in zip((one, other), lengths, strict=True))
+    strip = 0.5 * width * sum(lengths)
+    return caps < strip and min(_sameness(one), _sameness(other)) >= HOLE
 
 
-def _strip_area(one: Border, other: Border, width: float) -> float:
-    return 0.5 * width * float(one.lengths.sum() + other.lengths.sum())
+def _sameness(border: Border) -> float:
+    """Length of the mean unit normal along a rim: near 1 round a hole in a surface, near 0 round the end of a tube."""
+    return float(np.linalg.norm(border.lengths @ border.normals) / max(border.lengths.sum(), np.finfo(float).tiny))
 
 
 def fill(
@@ -113,8 +121,11 @@ def _drop_strays(work: Work) -> None:
     area = np.bincount(label, work.now.areas)
     open_ = np.bincount(label, adjacency.free[adjacency.triangle_edges].any(axis=1)) > 0
     scrap = open_ & (np.bincount(label) <= STRAY) & (area < STRAY_SHARE * area.sum())
+    scrap = free_to_drop(work, label, scrap)
     if scrap.any() and not scrap.all():
         gone = np.flatnonzero(scrap[label])
-        work.drop("stray triangles", "a scrap of a few triangles that is joined to nothing", gone)
+        gone = gone[np.argsort(label[gone], kind="stable")]
+        for own in np.split(gone, np.flatnonzero(np.diff(label[gone])) + 1):
+            work.drop("stray triangles", "a scrap of a few triangles that is joined to nothing", own)
         left = np.flatnonzero(~scrap[label])
         work.follow(work.now.take(left), left)

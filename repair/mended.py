@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,7 +11,11 @@ from patchwright.models.arrays import Array, BoolArray, IntArray
 from patchwright.models.tolerance import Tolerance
 from patchwright.models.triangulation import Triangulation
 
+if TYPE_CHECKING:
+    from patchwright.repair.decisions import Decisions
+
 KEPT, CUT, BRIDGED = 0, 1, 2
+LEFT_OUT = " left out"
 STRAY_SHARE = 1e-4  # of the area: what is smaller and joined to nothing, or thinner than the noise, is scrap
 
 
@@ -20,7 +25,8 @@ class Action:
 
     Parameters
     ----------
-    kind : "weld", "drop", "conform", "split", "orient", "bridge", "close", "unite", "wrap"
+    kind : "weld", "drop", "conform", "split", "orient", "trim", "bridge", "close", "unite", "wrap"; with `LEFT_OUT`
+        behind it, what was not done because it was decided so
     rung : its step on the ladder of least change
     where : (3,) middle of the place
     size : the place's extent, model length unit
@@ -44,7 +50,7 @@ class Action:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Dropped:
-    """Something that was removed: what, why, the parts concerned, area, middle, triangles of the input."""
+    """Something that was removed: what, why, the parts concerned, area, middle, triangles of the input, extent."""
 
     what: str
     why: str
@@ -52,6 +58,7 @@ class Dropped:
     area: float
     where: Array
     triangles: IntArray
+    size: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -104,6 +111,7 @@ class Work:
     problems: list[Problem] = field(default_factory=list)
     noise: float = 0.0
     distance: float = 0.0  # the weld distance
+    decisions: Decisions | None = None  # what stays as it is
 
     def follow(self, triangulation: Triangulation, parents: IntArray, cut: BoolArray | None = None) -> None:
         """Take over a stage's result: `parents` index the triangles before it, -1 are new."""
@@ -138,7 +146,7 @@ class Work:
         source = np.unique(self.source[now])
         source = source[source >= 0]
         area = float(some.areas.sum()) if area is None else area
-        self.dropped.append(Dropped(what, why, self.names(source), area, middle(some), source))
+        self.dropped.append(Dropped(what, why, self.names(source), area, middle(some), source, some.diagonal))
 
 
 def known(source: IntArray) -> IntArray:

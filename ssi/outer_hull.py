@@ -56,7 +56,7 @@ def outer_pieces(whole: Triangulation) -> tuple[Triangulation, IntArray]:
         return whole, number
     found = mesh_intersection(whole)
     cut = cut_triangles(whole, found)
-    patch = _patches(cut)
+    patch = regions(cut)
     front, back = _sides(whole, cut, patch)
     keep = ((front <= 0) & (back >= 1))[patch]
     keep &= ~_repeated(whole, found, cut)
@@ -99,7 +99,7 @@ def _welded(mesh: Triangulation) -> tuple[Triangulation, IntArray]:
     return Triangulation(mesh.vertices, triangles[good], tags=tags, tag_names=mesh.tag_names), np.flatnonzero(good)
 
 
-def _patches(cut: CutTriangles) -> IntArray:
+def regions(cut: CutTriangles) -> IntArray:
     """(m,) label of the connected region of each piece; seams and edges of more than two pieces part regions."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components

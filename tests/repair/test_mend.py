@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import dirty_shapes as shapes
@@ -8,6 +9,10 @@ import numpy as np
 import pytest
 
 from patchwright.models import ParameterError, Tolerance, Triangulation
+from patchwright.models.adjacency import Adjacency
+from patchwright.models.samples import DefectCase, eight_defects
+from patchwright.models.tree import Tree
+from patchwright.repair.crossings import crossing_pairs
 from patchwright.repair.mend import BRIDGED, CUT, KEPT, Mended, mend
 
 
@@ -23,51 +28,83 @@ def grid(origin: list[float], a: list[float], b: list[float], n: int) -> Triangu
     return Triangulation(points.reshape(-1, 3), rows)
 
 
-def cube(counts: list[int]) -> Triangulation:
-    x, y, z = np.eye(3).tolist()
-    sides = [([0, 0, 0], y, x), ([0, 0, 1], x, y), ([0, 0, 0], x, z), ([0, 1, 0], z, x), ([0, 0, 0], z, y),
-             ([1, 0, 0], y, z)]  # fmt: skip
-    return shapes.together(*[grid(*side, n) for side, n in zip(sides, counts, strict=True) if n])  # type: ignore[arg-type]
-
-
-def flipped_and_doubled() -> Triangulation:
-    whole, rng = shapes.sphere(3), np.random.default_rng(0)
-    rows = np.where(rng.random((len(whole), 1)) < 0.4, whole.triangles[:, ::-1], whole.triangles)
-    return Triangulation(whole.vertices, np.concatenate([rows, rows[rng.random(len(rows)) < 0.1]]))
-
-
 CAPSULE = shapes.together(shapes.half(1, 0.0), shapes.half(-1, 0.0)).volume
-PRISM = 24 * np.sin(2 * np.pi / 48)
-EIGHT = {
-    "gap1": (shapes.together(shapes.half(1, 0.01), shapes.half(-1, -0.01)), CAPSULE + 0.02 * PRISM),
-    "gap5": (shapes.together(shapes.half(1, 0.05), shapes.half(-1, -0.05)), CAPSULE + 0.1 * PRISM),
-    "gap10": (shapes.together(shapes.half(1, 0.1), shapes.half(-1, -0.1)), CAPSULE + 0.2 * PRISM),
-    "overlap5": (shapes.together(shapes.half(1, -0.05), shapes.half(-1, 0.05)), CAPSULE - 0.1 * PRISM),
-    "tjunc": (cube([8, 8, 5, 5, 3, 3]), 1.0),
-    "selfx": (shapes.together(shapes.sphere(4), shapes.sphere(4, at=(1.0, 0.03, 0.02))), None),
-    "missface": (cube([6, 0, 6, 6, 6, 6]), 1.0),
-    "flipdup": (flipped_and_doubled(), shapes.sphere(3).volume),
-}
 
 
-@pytest.mark.parametrize("name", EIGHT)
-def test_eight_defects_are_closed_with_one_parameter_set(name: str) -> None:
-    dirty, volume = EIGHT[name]
-    if volume is None:
-        d = np.sqrt(1.0 + 0.03**2 + 0.02**2)
-        share = 1.0 - (4 + d) * (2 - d) ** 2 / 32  # union of two spheres over both
-        volume = 2 * shapes.sphere(4).volume * share
-    result = mended(Triangulation(dirty.vertices, dirty.triangles))
+@cache
+def cases(shape: str, size: float, seed: int) -> dict[str, DefectCase]:
+    return eight_defects(shape, size=size, place=(3.0 * size, -size, 0.5 * size), seed=seed)
+
+
+@pytest.mark.parametrize("name", ["gap1", "gap5", "gap10", "overlap5", "tjunc", "selfx", "missface", "flipdup"])
+@pytest.mark.parametrize(("shape", "size", "seed"), [("sphere", 1.0, 0), ("ellipsoid", 1e3, 1), ("torus", 1e-3, 2),
+                                                     ("blade", 1.0, 3)])  # fmt: skip
+def test_eight_defects_are_mended_with_one_parameter_set(shape: str, size: float, seed: int, name: str) -> None:
+    case = cases(shape, size, seed)[name]
+    dirty = case.triangulation
+    result = mended(dirty, "close" if name == "missface" else "keep")
+    body = result.triangulation
     assert result.closed
     assert result.problems == ()
-    assert shapes.is_closed_manifold(result.triangulation)
-    assert result.triangulation.volume == pytest.approx(volume, rel=3e-3)
-    # kept triangles are where they were, but for welding
+    assert (shapes.edge_uses(body) == 2).all()
+    assert (shapes.directed_uses(body) == 1).all()
+    adjacency = Adjacency.of(body)
+    assert adjacency.components().max() == 0
+    assert len(np.unique(body.triangles)) - len(adjacency.edges) + len(body) == case.euler
+    assert len(crossing_pairs(body, 1e-12 * body.diagonal)) == 0
+    assert body.volume == pytest.approx(case.volume, rel=3e-3)
+    # what was undamaged is where it was
+    points = np.concatenate([case.kept.vertices, case.kept.corners.mean(axis=1)])
+    assert Tree.of(body).closest(points).distance.max() <= 1e-4 * dirty.diagonal
     kept = result.origin == KEPT
+    assert kept.mean() > 0.5
     given = np.sort(dirty.corners[result.source[kept]].reshape(-1, 9), axis=1)
-    now = np.sort(result.triangulation.corners[kept].reshape(-1, 9), axis=1)
-    assert np.abs(given - now).max() <= Tolerance.of(dirty).fit
+    assert np.abs(given - np.sort(body.corners[kept].reshape(-1, 9), axis=1)).max() <= 1e-12 * dirty.diagonal
     assert (result.source[result.origin == BRIDGED] == -1).all()
+    assert (result.source[result.origin != BRIDGED] >= 0).all()
+    assert (result.origin == BRIDGED).any() == (name in {"gap1", "gap5", "gap10", "missface"}) or name == "overlap5"
+
+
+@pytest.mark.parametrize("depth", [0.02, 0.05, 0.1])
+def test_sheets_that_run_past_each_other_are_trimmed_where_they_cross(depth: float) -> None:
+    """Two hemispheres pushed into each other cross in the mirror plane: nothing is invented, the lens volume goes."""
+    result = mended(shapes.together(shapes.half(1, -depth), shapes.half(-1, depth)), "keep")
+    assert result.closed
+    assert not (result.origin == BRIDGED).any()
+    assert [action.kind for action in result.actions if action.rung == "re-trim"] == ["trim"]
+    assert any(drop.what == "overlapping rims" for drop in result.dropped)
+    slice_ = 2.0 * np.pi * (depth - depth**3 / 3.0)  # of the unit ball between -depth and depth
+    whole = 4.0 / 3.0 * np.pi
+    assert result.triangulation.volume == pytest.approx((whole - slice_) * CAPSULE / whole, rel=1e-3)
+
+
+@pytest.mark.parametrize("offset", [1e-3, 1e-2])
+def test_sheets_that_run_past_each_other_without_crossing_are_cut_back_and_bridged(offset: float) -> None:
+    """A tube that ends inside a slightly wider one: the step between them is all that is invented."""
+    rng = np.random.default_rng(0)
+    turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    turn *= np.linalg.det(turn)
+    parts = []
+    for radius, low, high in ((1.0, -3.0, 0.1), (1.0 + offset, -0.1, 3.0)):
+        angle = np.linspace(0.0, 2.0 * np.pi, 64, endpoint=False)
+        z = np.linspace(low, high, 32)
+        points = np.stack(
+            [radius * np.cos(angle) + 0 * z[:, None], radius * np.sin(angle) + 0 * z[:, None], z[:, None] + 0 * angle],
+            2,
+        )
+        k = np.arange(31)[:, None] * 64
+        i, j = np.arange(64), np.roll(np.arange(64), -1)
+        a, b, c, d = k + i, k + j, k + 64 + j, k + 64 + i
+        rows = np.stack([np.stack([a, b, c], 2), np.stack([a, c, d], 2)], 2).reshape(-1, 3)
+        parts.append(Triangulation(points.reshape(-1, 3) @ turn.T, rows))
+    result = mended(shapes.together(*parts), "keep")
+    assert result.problems == ()
+    assert len(result.openings) == 2
+    assert Adjacency.of(result.triangulation).components().max() == 0
+    invented = result.triangulation.areas[result.origin == BRIDGED].sum()
+    strip = 2.0 * np.pi * np.hypot(max(0.1 * 0.2, 2.0 * offset), offset)
+    assert 0.0 < invented <= 1.1 * strip
+    assert shapes.directed_uses(result.triangulation).max() == 1
 
 
 def test_a_clean_body_comes_back_to_the_last_bit() -> None:
