@@ -117,8 +117,8 @@ def _overlap(whole: Triangulation, middle: Array, n: Array, depth: float) -> Def
         outer = step.triangulation.take(step.side * side > 0)
         local = outer.corners - at  # seen from a point of the cut, its plane adds nothing
         volume += float(np.einsum("ij,ij->", local[:, 0], np.cross(local[:, 1], local[:, 2]))) / 6.0
-        clear = cut(outer, middle + side * depth * n, n)
-        clear = clear.triangulation.take(clear.side * side > 0).compact()
+        beyond = cut(outer, middle + side * depth * n, n)
+        clear = beyond.triangulation.take(beyond.side * side > 0).compact()
         pieces.append(Triangulation(clear.vertices - side * 0.5 * depth * n, clear.triangles))
     together = push_apart(whole, middle, n, -depth).triangulation
     return DefectCase(together, volume, False, concatenate(pieces), _euler(whole))
