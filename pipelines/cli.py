@@ -126,6 +126,21 @@ def repair(
     tolerance: Annotated[
         float | None, typer.Option(help="Fit tolerance in model units [1e-4 of the diagonal].")
     ] = None,
+    farfield: FarField = None,
+    symmetry: Symmetry = None,
+    fluid: Fluid = None,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Only tell what would be done, item by item; --json gives the plan.")
+    ] = False,
+    write_plan: Annotated[
+        Path | None, typer.Option("--write-plan", help="With --dry-run: write the plan to this file, to be edited.")
+    ] = None,
+    plan: Annotated[
+        Path | None, typer.Option("--plan", help="Follow a reviewed plan: its rejected items are left out.")
+    ] = None,
+    reject: Annotated[
+        list[str] | None, typer.Option("--reject", help="With --plan: id of one more item to reject (repeatable).")
+    ] = None,
     json: Json = False,
     quiet: Quiet = False,
 ) -> None:
@@ -133,7 +148,30 @@ def repair(
     from patchwright.pipelines.recipe import repair_recipe
     from patchwright.pipelines.run import run
 
-    recipe = repair_recipe(file, output, scope=scope.value, openings=openings.value, tolerance=tolerance)
+    if write_plan is not None and not dry_run:
+        raise typer.BadParameter("--write-plan goes with --dry-run")
+    if reject and plan is None:
+        raise typer.BadParameter("--reject goes with --plan: make one with --dry-run --write-plan FILE")
+    recipe = repair_recipe(
+        file,
+        output,
+        scope=scope.value,
+        openings=openings.value,
+        tolerance=tolerance,
+        domain=_domain(farfield, symmetry, fluid),
+        plan=plan,
+        reject=tuple(reject or ()),
+    )
+    if dry_run:
+        from patchwright.pipelines.planning import run_plan
+        from patchwright.pipelines.summary import plan_lines
+
+        made = run_plan(recipe, write=write_plan, terminal=_terminal(quiet))
+        if json:
+            _say_json(made.to_json())
+        else:
+            _say("\n".join(plan_lines(made)))
+        raise typer.Exit(FOUND if made.problems else DONE)
     _finish(run(recipe, terminal=_terminal(quiet)), json)
 
 

@@ -4,6 +4,14 @@ source = "wing.stl"
 folder = "wing-patchwright"
 tolerance = 0.001        # fit tolerance, model units; left out: 1e-4 of the diagonal
 
+plan = "plan.json"       # a reviewed plan; its rejected items are left out
+
+[domain]                 # what is left out is guessed, with reasons
+far_field = ["box"]
+symmetry = "y"
+fluid = [0.0, 0.0, 5.0]
+gaps.flap = "keep"       # a slot is no panel gap
+
 [[stage]]
 name = "repair"
 openings = "close"
@@ -16,8 +24,9 @@ from pathlib import Path
 from typing import Any
 
 from patchwright.models.errors import CorruptFile, ParameterError
+from patchwright.repair.domain import Domain
 
-_TOP_LEVEL = {"source", "folder", "tolerance", "unit", "stage"}
+_TOP_LEVEL = {"source", "folder", "tolerance", "unit", "domain", "plan", "stage"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,13 +39,16 @@ class Step:
 
 @dataclass(frozen=True, slots=True)
 class Recipe:
-    """What to read, where to write, and the stages in order."""
+    """What to read, where to write, and the stages in order; `reject` are ids of items of `plan`, besides its own."""
 
     source: Path
     folder: Path
     steps: tuple[Step, ...]
     tolerance: float | None = None
     unit: str | None = None
+    domain: Domain | None = None
+    plan: Path | None = None
+    reject: tuple[str, ...] = ()
 
 
 def default_folder(source: Path) -> Path:
@@ -48,7 +60,15 @@ def default_folder(source: Path) -> Path:
 
 
 def repair_recipe(
-    source: Path, folder: Path | None, *, scope: str = "least", openings: str = "keep", tolerance: float | None = None
+    source: Path,
+    folder: Path | None,
+    *,
+    scope: str = "least",
+    openings: str = "keep",
+    tolerance: float | None = None,
+    domain: Domain | None = None,
+    plan: Path | None = None,
+    reject: tuple[str, ...] = (),
 ) -> Recipe:
     """What `patchwright repair` does."""
     steps = (
@@ -58,7 +78,8 @@ def repair_recipe(
         Step("pictures", {}),
         Step("report", {}),
     )
-    return Recipe(source, folder or default_folder(source), steps, tolerance)
+    place = folder or default_folder(source)
+    return Recipe(source, place, steps, tolerance, domain=domain, plan=plan, reject=reject)
 
 
 def load_recipe(path: Path) -> Recipe:
@@ -100,4 +121,11 @@ def load_recipe(path: Path) -> Recipe:
         raise ParameterError(f"{path}: tolerance must be a positive length, got {tolerance!r}")
     source = path.parent / table["source"]
     folder = path.parent / table["folder"] if "folder" in table else path.parent / default_folder(source)
-    return Recipe(source, folder, tuple(steps), tolerance, table.get("unit"))
+    domain = None
+    if "domain" in table:
+        try:
+            domain = Domain.from_table(table["domain"])
+        except ParameterError as error:
+            raise ParameterError(f"{path}: {error}") from None
+    plan = path.parent / table["plan"] if "plan" in table else None
+    return Recipe(source, folder, tuple(steps), tolerance, table.get("unit"), domain, plan)

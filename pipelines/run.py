@@ -8,12 +8,14 @@ from pathlib import Path
 
 from patchwright.models.assembly import Assembly
 from patchwright.models.errors import ParameterError
-from patchwright.models.tolerance import Tolerance
+from patchwright.pipelines.planning import load_plan
 from patchwright.pipelines.progress import Terminal
 from patchwright.pipelines.recipe import Recipe, load_recipe
 from patchwright.pipelines.stages import STAGES
 from patchwright.pipelines.study import StageReport, Study
 from patchwright.pipelines.warm import start
+from patchwright.repair.ladder import fit_tolerance
+from patchwright.repair.surroundings import surroundings
 
 
 def run(recipe: Recipe | Path | str, *, assembly: Assembly | None = None, terminal: Terminal | None = None) -> Study:
@@ -33,31 +35,12 @@ def run(recipe: Recipe | Path | str, *, assembly: Assembly | None = None, termin
     ------
     GeometryError : unreadable input, an option without meaning. A refusal raises nothing: see `.repaired.verdict`.
     """
-    plan = recipe if isinstance(recipe, Recipe) else load_recipe(Path(recipe))
+    task = recipe if isinstance(recipe, Recipe) else load_recipe(Path(recipe))
     shown = terminal or Terminal(quiet=True)
-    started = time.perf_counter()
-    if assembly is None:
-        from patchwright.models.io import read
-
-        with shown.stage("read") as report:
-            report("reading", 0.0)
-            assembly = read(plan.source, unit=plan.unit)
-    count = sum(len(part.triangulation) for part in assembly.parts)
-    if count == 0:
-        raise ParameterError(f"{plan.source}: holds no faces and no triangles; there is nothing to work on")
-    if count == 1 and not assembly.is_cad:
-        raise ParameterError(f"{plan.source}: holds a single triangle; a surface to repair needs more than that")
-    tolerance = Tolerance.of(assembly, fit=plan.tolerance)
+    study = begin(task, assembly, shown)
     if terminal is not None:
         start(terminal)  # not before the input is known to be good
-    study = Study(
-        str(plan.source),
-        plan.folder,
-        assembly,
-        tolerance,
-        reports=(StageReport("read", time.perf_counter() - started),),
-    )
-    for step in plan.steps:
+    for step in task.steps:
         stage = STAGES[step.name]
         options = stage.settings(step.options)
         started = time.perf_counter()
@@ -66,3 +49,36 @@ def run(recipe: Recipe | Path | str, *, assembly: Assembly | None = None, termin
         seconds = time.perf_counter() - started
         study = replace(study, reports=(*study.reports, StageReport(step.name, seconds, figures)))
     return study
+
+
+def begin(task: Recipe, assembly: Assembly | None, shown: Terminal) -> Study:
+    """Read the source (unless the assembly is given) and resolve what every stage needs.
+
+    Raises
+    ------
+    GeometryError : unreadable input, nothing to work on, a domain or plan without meaning.
+    """
+    known = None if task.plan is None else load_plan(task.plan, task.reject)
+    started = time.perf_counter()
+    if assembly is None:
+        from patchwright.models.io import read
+
+        with shown.stage("read") as report:
+            report("reading", 0.0)
+            assembly = read(task.source, unit=task.unit)
+    count = sum(len(part.triangulation) for part in assembly.parts)
+    if count == 0:
+        raise ParameterError(f"{task.source}: holds no faces and no triangles; there is nothing to work on")
+    if count == 1 and not assembly.is_cad:
+        raise ParameterError(f"{task.source}: holds a single triangle; a surface to repair needs more than that")
+    around = surroundings(assembly, task.domain)
+    return Study(
+        str(task.source),
+        task.folder,
+        assembly,
+        fit_tolerance(assembly, around, task.tolerance),
+        domain=task.domain,
+        plan=known,
+        reports=(StageReport("read", time.perf_counter() - started),),
+        notes=around.reasons,
+    )

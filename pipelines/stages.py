@@ -39,11 +39,12 @@ def _diagnose(study: Study, options: dict[str, Any], report: Report) -> Outcome:
     from patchwright.repair import diagnose
 
     report("diagnosing", 0.0)
-    before = diagnose(study.assembly, tolerance=study.tolerance)
+    before = diagnose(study.assembly, tolerance=study.tolerance, domain=study.domain, progress=report)
     return replace(study, before=before), {"defects": len(before.defects), "clean": before.clean}
 
 
 def _repair(study: Study, options: dict[str, Any], report: Report) -> Outcome:
+    from patchwright.pipelines.planning import against_plan
     from patchwright.repair import repair
 
     repaired = repair(
@@ -51,10 +52,14 @@ def _repair(study: Study, options: dict[str, Any], report: Report) -> Outcome:
         scope=options["scope"],
         openings=options["openings"],
         tolerance=study.tolerance,
+        domain=study.domain,
+        plan=study.plan,
         diagnosis=study.before,
         progress=report,
     )
-    return replace(study, repaired=repaired), {"verdict": repaired.verdict.value, "faces": len(repaired.faces)}
+    notes = study.notes if study.plan is None else (*study.notes, against_plan(study.plan, repaired))
+    figures = {"verdict": repaired.verdict.value, "faces": len(repaired.faces)}
+    return replace(study, repaired=repaired, notes=notes), figures
 
 
 def _write(study: Study, options: dict[str, Any], report: Report) -> Outcome:

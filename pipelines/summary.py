@@ -10,6 +10,7 @@ from patchwright.pipelines.check import Checked
 from patchwright.pipelines.study import Study
 from patchwright.repair.deviation import Spread
 from patchwright.repair.diagnosis import Diagnosis
+from patchwright.repair.plan import Plan
 from patchwright.repair.result import Repaired, Verdict
 
 MOST_LINES = 12
@@ -75,6 +76,19 @@ def count_lines(diagnosis: Diagnosis) -> list[str]:
         lines.append(f"  free edges by tolerance (shares of the diagonal): {steps}")
         lines.append(f"  {told['free_edge_reading']}")
     return lines + [f"  domain: {sentence}" for sentence in told.get("domain") or ()]
+
+
+def plan_lines(plan: Plan) -> list[str]:
+    """What a repair would do, item by item."""
+    lines = [f"{plan.source}: {_plural(len(plan.items), 'change')} planned"]
+    for item in plan.items:
+        word = "rejected" if not item.accepted else "optional" if item.optional else ""
+        place = "" if item.where is None else f" at {_place(item.where)}, {item.size:.3g} large"
+        parts = f" ({', '.join(item.parts)})" if any(item.parts) else ""
+        lines.append(f"  {item.id:<28} {item.rung:<10} {word:<8} {item.count:>8}{place}{parts}: {item.reason}")
+    lines += [f"  domain: {sentence}" for sentence in plan.domain]
+    lines += [f"  would be refused: {p.kind} at {_place(p.where)}: {p.message}" for p in plan.problems]
+    return lines
 
 
 def study_lines(study: Study) -> list[str]:

@@ -6,17 +6,22 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from patchwright.repair.diagnosing import diagnose
     from patchwright.repair.diagnosis import Defect, Diagnosis
-    from patchwright.repair.ladder import repair
+    from patchwright.repair.domain import Domain
+    from patchwright.repair.ladder import plan_repair, repair
+    from patchwright.repair.plan import Plan
     from patchwright.repair.result import Repaired, Verdict
 
-__all__ = ["Defect", "Diagnosis", "Repaired", "Verdict", "diagnose", "repair"]
+__all__ = ["Defect", "Diagnosis", "Domain", "Plan", "Repaired", "Verdict", "diagnose", "plan_repair", "repair"]
 
 _HOMES = {
     "Defect": "diagnosis",
     "Diagnosis": "diagnosis",
+    "Domain": "domain",
+    "Plan": "plan",
     "Repaired": "result",
     "Verdict": "result",
     "diagnose": "diagnosing",
+    "plan_repair": "ladder",
     "repair": "ladder",
 }
 

@@ -1,15 +1,20 @@
-"""`repair`: the way in. Chooses the route by what the input is and climbs the least-change ladder."""
+"""`repair` and `plan_repair`: the ways in. They choose the route by what the input is; the routes climb the ladder."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 from patchwright.models.assembly import Assembly
 from patchwright.models.errors import ParameterError
 from patchwright.models.tolerance import Tolerance
 from patchwright.models.triangulation import Triangulation
+from patchwright.repair.decisions import Decisions
 from patchwright.repair.diagnosis import Diagnosis
-from patchwright.repair.result import Progress, Repaired
+from patchwright.repair.domain import Domain
+from patchwright.repair.plan import Plan, compared, plan_of
+from patchwright.repair.result import LedgerEntry, Progress, Repaired, Rung
+from patchwright.repair.surroundings import Surroundings, surroundings
 
 SCOPES = ("least", "all")
 OPENINGS = ("keep", "close")
@@ -22,7 +27,8 @@ def repair(
     layout: Any = "auto",
     openings: Literal["keep", "close"] = "keep",
     tolerance: Tolerance | float | None = None,
-    domain: None = None,
+    domain: Domain | None = None,
+    plan: Plan | None = None,
     diagnosis: Diagnosis | None = None,
     progress: Progress | None = None,
 ) -> Repaired:
@@ -34,43 +40,182 @@ def repair(
     scope : "least" keeps what is good, "all" resurfaces everything
     layout : "auto", a `QuadLayout`, or a list of patches, each given by four boundary curves or four corner points
     openings : "keep" reports planned openings and leaves them, "close" caps them
-    tolerance : a `Tolerance`, or the fit tolerance as a length; default 1e-4 of the diagonal
-    domain : reserved for the flow domain; only None is accepted for now
+    tolerance : a `Tolerance`, or the fit tolerance as a length; default 1e-4 of the diagonal of the body
+    domain : the flow domain round the body; what it does not say is guessed
+    plan : a reviewed plan: its rejected items are left out, and what does not fit it is told in the ledger
     diagnosis : of the same assembly, when it has been made already
     progress : called with a label and a share in [0, 1]
 
     Returns
     -------
     Repaired; a model that cannot be repaired comes back with verdict "refused" and the coordinates of the reasons.
+    What bounds the domain from outside (far field, symmetry parts) is in `.triangulation` as it came, without patches.
 
     Raises
     ------
-    ParameterError : an option without meaning, an empty assembly.
+    ParameterError : an option without meaning, an empty assembly, a domain that names what is not there.
     """
+    say = progress or _silent
+    task = _task(assembly, scope, openings, tolerance, domain, plan, diagnosis, say)
+    if task.model.is_cad and scope == "least":
+        from patchwright.repair.cad_route import repair_cad
+
+        result = repair_cad(task.model, task.limits, openings=openings, diagnosis=task.diagnosis, progress=say)
+        result = replace(result, ledger=(*task.entries, *result.ledger))
+    else:
+        from patchwright.repair.aside import with_aside
+        from patchwright.repair.given_layout import layout_of
+        from patchwright.repair.mesh_route import repair_mesh
+
+        given = layout if isinstance(layout, str) else layout_of(layout, task.limits)
+        result = repair_mesh(
+            task.body,
+            task.limits,
+            scope=scope,
+            layout=given,
+            openings=openings,
+            clean=task.diagnosis.clean and not task.entries,
+            decisions=task.decisions,
+            progress=say,
+        )
+        result = with_aside(replace(result, ledger=(*task.entries, *result.ledger)), task.model, task.around)
+    if plan is None:
+        return result
+    return replace(result, ledger=(*result.ledger, *_against(plan, result.ledger, task.decisions.diagonal)))
+
+
+def plan_repair(
+    assembly: Assembly | Triangulation,
+    *,
+    scope: str = "least",
+    openings: Literal["keep", "close"] = "keep",
+    tolerance: Tolerance | float | None = None,
+    domain: Domain | None = None,
+    diagnosis: Diagnosis | None = None,
+    progress: Progress | None = None,
+) -> Plan:
+    """What `repair` would do with the same arguments, item by item; nothing is fitted, nothing is written.
+
+    Raises
+    ------
+    ParameterError : as `repair`.
+    """
+    say = progress or _silent
+    task = _task(assembly, scope, openings, tolerance, domain, None, diagnosis, say)
+    size = task.decisions.diagonal
+    reasons = task.around.reasons
+    if task.model.is_cad and scope == "least":
+        from patchwright.repair.cad_route import repair_cad
+
+        made = repair_cad(task.model, task.limits, openings=openings, diagnosis=task.diagnosis, progress=say)
+        return plan_of(task.model.source, (*task.entries, *made.ledger), size, made.problems, reasons)
+    from patchwright.repair.mend import mend
+    from patchwright.repair.mesh_route import mending_ledger, problems_of
+
+    mended = mend(task.body.triangulation, task.limits, openings=openings, decisions=task.decisions, progress=say)
+    ledger = (*task.entries, *mending_ledger(mended))
+    return plan_of(task.model.source, ledger, size, problems_of(mended), reasons)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Task:
+    """A checked request: the model, the body in it, and all that was decided before any mending."""
+
+    model: Assembly
+    body: Assembly
+    around: Surroundings
+    limits: Tolerance
+    diagnosis: Diagnosis
+    decisions: Decisions
+    entries: tuple[LedgerEntry, ...]
+
+
+def _task(
+    assembly: Assembly | Triangulation,
+    scope: str,
+    openings: str,
+    tolerance: Tolerance | float | None,
+    domain: Domain | None,
+    plan: Plan | None,
+    diagnosis: Diagnosis | None,
+    say: Progress,
+) -> _Task:
     if scope not in SCOPES:
         raise ParameterError(f"scope must be one of {', '.join(SCOPES)}, got {scope!r}")
     if openings not in OPENINGS:
         raise ParameterError(f"openings must be one of {', '.join(OPENINGS)}, got {openings!r}")
-    if domain is not None:
-        raise ParameterError("domain must be None in this version")
+    if not isinstance(domain, Domain | None):
+        raise ParameterError(f"domain must be a Domain or None, got {type(domain).__name__}")
     model = Assembly.of(assembly) if isinstance(assembly, Triangulation) else assembly
     if not any(len(part.triangulation) for part in model.parts):
         raise ParameterError(
             f"{model.source or 'the assembly'} holds no triangles and no faces: there is nothing to repair"
         )
-    limits = tolerance if isinstance(tolerance, Tolerance) else Tolerance.of(model, fit=tolerance)
-    say = progress or (lambda label, share: None)
+    around = surroundings(model, domain)
+    limits = tolerance if isinstance(tolerance, Tolerance) else fit_tolerance(model, around, tolerance)
     if diagnosis is None:
         from patchwright.repair.diagnosing import diagnose
 
         say("diagnosing", 0.0)
-        diagnosis = diagnose(model, tolerance=limits)
-    if model.is_cad and scope == "least":
-        from patchwright.repair.cad_route import repair_cad
+        diagnosis = diagnose(model, tolerance=limits, domain=domain)
+    body, entries = (model, ()) if model.is_cad and scope == "least" else _body(model, around, limits)
+    rejected = tuple(item.fingerprint for item in plan.rejected) if plan is not None else ()
+    decisions = Decisions(around, around.body_size(model).diagonal, limits.fit, rejected)
+    return _Task(model, body, around, limits, diagnosis, decisions, entries)
 
-        return repair_cad(model, limits, openings=openings, diagnosis=diagnosis, progress=say)
-    from patchwright.repair.given_layout import layout_of
-    from patchwright.repair.mesh_route import repair_mesh
 
-    given = layout if isinstance(layout, str) else layout_of(layout, limits)
-    return repair_mesh(model, limits, scope=scope, layout=given, openings=openings, clean=diagnosis.clean, progress=say)
+def fit_tolerance(model: Assembly, around: Surroundings, fit: float | None) -> Tolerance:
+    """The tolerances of a model: from its body's size; the smallest of those given for single parts holds for all."""
+    given = around.domain.tolerances
+    if fit is None and given:
+        fit = min(given.values())
+    return Tolerance.of(around.body_size(model), fit=fit)
+
+
+def _body(model: Assembly, around: Surroundings, limits: Tolerance) -> tuple[Assembly, tuple[LedgerEntry, ...]]:
+    """The triangles to be mended, the borders at symmetry planes put on them exactly, and the entry that says so."""
+    body = around.body(model)
+    if not around.planes or body.is_cad:
+        return body, ()
+    from patchwright.repair.checks.examination import Examination
+    from patchwright.repair.symmetry import on_planes
+
+    inside = replace(around, aside=around.aside[~around.aside])
+    mesh, moved, farthest = on_planes(Examination(body, limits, inside))
+    if not len(moved):
+        return body, ()
+    x, y, z = mesh.vertices[moved].mean(axis=0).tolist()
+    names = ", ".join(plane.name for plane in around.planes)
+    reason = f"border vertices within {limits.fit:.3g} of the symmetry plane {names} are put on it exactly"
+    entry = LedgerEntry(
+        "put on the symmetry plane", Rung.WELD, (), reason, count=len(moved), tolerance=limits.fit,
+        largest_move=farthest, where=(x, y, z), size=body.diagonal,
+    )  # fmt: skip
+    parts, start = [], 0
+    for part in body.parts:
+        count = len(part.triangulation.vertices)
+        points = mesh.vertices[start : start + count]
+        start += count
+        parts.append(replace(part, triangulation=replace(part.triangulation, vertices=points)))
+    return replace(body, parts=tuple(parts)), (entry,)
+
+
+def _against(plan: Plan, ledger: tuple[LedgerEntry, ...], diagonal: float) -> tuple[LedgerEntry, ...]:
+    """What of a plan a run did not meet, and what it did beside the plan."""
+    missing, unplanned = compared(plan, ledger, diagonal)
+    gone = "the plan lists it and this model does not ask for it"
+    new = "this model asks for it and the plan does not list it"
+    return (
+        *(
+            LedgerEntry(f"planned item {i.id} not met", Rung.KEEP, i.parts, gone, count=0, where=i.where, size=i.size)
+            for i in missing
+        ),
+        *(
+            LedgerEntry(f"{e.what} beside the plan", Rung.KEEP, e.parts, new, count=0, where=e.where, size=e.size)
+            for e in unplanned
+        ),
+    )
+
+
+def _silent(label: str, share: float) -> None:
+    """No progress wanted."""

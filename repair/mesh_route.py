@@ -22,16 +22,19 @@ from patchwright.models.triangulation import Triangulation
 from patchwright.repair.block_grid import block_grid
 from patchwright.repair.blocks import Blocks, find_blocks, smallest_corner
 from patchwright.repair.cad_ground import ground_of, measured, on_model, true_entry
+from patchwright.repair.decisions import Decisions
 from patchwright.repair.deviation import Deviation
 from patchwright.repair.faceting import faceting
 from patchwright.repair.last_resort import wrapped
 from patchwright.repair.mend import BRIDGED, CUT, KEPT, Mended, mend
+from patchwright.repair.mended import LEFT_OUT
 from patchwright.repair.network import PatchNetwork
 from patchwright.repair.network_seams import measure
 from patchwright.repair.patch_fit import Target
 from patchwright.repair.quad_layout import QuadLayout, quad_layout
 from patchwright.repair.result import Face, LedgerEntry, Point, Problem, Progress, Repaired, Rung, Seam, Verdict
 from patchwright.repair.resurface import resurface
+from patchwright.repair.symmetry import settled
 from patchwright.repair.true_ground import TrueGround
 
 COVERAGE_GOAL = 0.99  # share of the area, both ways, within the fit tolerance; below it a result has not converged
@@ -51,6 +54,7 @@ def repair_mesh(
     layout: str | QuadLayout,
     openings: Literal["keep", "close"],
     clean: bool,
+    decisions: Decisions | None = None,
     progress: Progress,
 ) -> Repaired:
     """Mend a triangulated assembly and fit patches to it.
@@ -58,19 +62,19 @@ def repair_mesh(
     Parameters
     ----------
     clean : whether diagnosis found nothing wrong
+    decisions : what stays as it is, and the symmetry planes whose borders stay on them
     scope : "least" keeps the input's triangles in the output triangulation, "all" takes the patches' tessellation
 
     The other arguments are those of `repair`.
     """
     raw = assembly.triangulation
-    mended = mend(raw, tolerance, openings=openings, progress=progress)
+    mended = mend(raw, tolerance, openings=openings, decisions=decisions, progress=progress)
     if mended.problems and scope == "all":
         progress("wrapping", 0.0)
         mended = wrapped(mended, raw, tolerance)
-    ledger = _mending_ledger(assembly, mended)
+    ledger = mending_ledger(mended)
     if mended.problems:
-        problems = tuple(Problem(p.kind, _point(p.where), float(p.size), p.message) for p in mended.problems)
-        return _refused(assembly, mended, ledger, problems)
+        return _refused(assembly, mended, ledger, problems_of(mended))
     ground = ground_of(assembly, mended)
     resolution = 0.0
     if not isinstance(ground, TrueGround):
@@ -81,6 +85,8 @@ def repair_mesh(
         middle = _point(mended.triangulation.bounds.mean(axis=0))
         message = f"no layout of quads was found: {error}"
         return _refused(assembly, mended, ledger, (Problem("layout", middle, raw.diagonal, message),))
+    if decisions is not None and decisions.surroundings.planes:
+        network = settled(network, decisions.surroundings.planes, tolerance.fit)
     if deviation.coverage < COVERAGE_LEAST:
         return _refused(assembly, mended, ledger, (_uncovered(deviation),))
     blocks = find_blocks(network.layout)
@@ -96,7 +102,7 @@ def repair_mesh(
         triangulation = replace(tessellation, tags=tags, tag_names=mended.triangulation.tag_names)
     else:
         triangulation = mended.triangulation
-    changed = bool(mended.actions or mended.dropped)
+    changed = bool(mended.dropped) or any(not a.kind.endswith(LEFT_OUT) for a in mended.actions)
     verdict = Verdict.INVENTED if invented > 0 else Verdict.CLEAN if clean and not changed else Verdict.REPAIRED
     parts = tuple(
         Part(
@@ -191,7 +197,12 @@ def _faces(network: PatchNetwork, mended: Mended) -> tuple[Face, ...]:
     )
 
 
-def _mending_ledger(assembly: Assembly, mended: Mended) -> tuple[LedgerEntry, ...]:
+def problems_of(mended: Mended) -> tuple[Problem, ...]:
+    """Why the mender refuses."""
+    return tuple(Problem(p.kind, _point(p.where), float(p.size), p.message) for p in mended.problems)
+
+
+def mending_ledger(mended: Mended) -> tuple[LedgerEntry, ...]:
     """What was kept, part by part, every action of the mender, and everything that was dropped."""
     entries = []
     body = mended.triangulation
@@ -221,6 +232,7 @@ def _mending_ledger(assembly: Assembly, mended: Mended) -> tuple[LedgerEntry, ..
                 largest_move=float(action.largest_move),
                 area=float(action.area),
                 where=_point(action.where),
+                size=float(action.size),
             )
         )
     for piece in mended.dropped:
@@ -233,6 +245,7 @@ def _mending_ledger(assembly: Assembly, mended: Mended) -> tuple[LedgerEntry, ..
                 count=len(piece.triangles),
                 area=float(piece.area),
                 where=_point(piece.where),
+                size=float(piece.size),
             )
         )
     return tuple(entries)

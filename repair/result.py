@@ -34,6 +34,8 @@ class Rung(StrEnum):
     KEEP = "keep"
     WELD = "weld"
     CUT = "re-trim"
+    STRIP = "move a boundary strip"
+    REALIGN = "put back"
     BRIDGE = "bridge"
     RESURFACE = "resurface"
     DROP = "drop"
@@ -73,7 +75,7 @@ class Seam:
 
 @dataclass(frozen=True, slots=True)
 class LedgerEntry:
-    """One change, or one thing left alone: what, why, by how much and where."""
+    """One change, or one thing left alone: what, why, by how much, where, and the extent of the place."""
 
     what: str
     rung: Rung
@@ -84,6 +86,7 @@ class LedgerEntry:
     largest_move: float = 0.0
     area: float = 0.0
     where: Point | None = None
+    size: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

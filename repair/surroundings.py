@@ -58,6 +58,20 @@ class Surroundings:
     planes: tuple[SymmetryPlane, ...] = ()
     reasons: tuple[str, ...] = ()
 
+    def body(self, model: Assembly) -> Assembly:
+        """A triangulated model without what bounds the domain; parts that are nothing else go."""
+        if not self.aside.any():
+            return model
+        parts, start = [], 0
+        for part in model.parts:
+            keep = ~self.aside[start : start + len(part.triangulation)]
+            start += len(keep)
+            if keep.all() or not len(keep):
+                parts.append(part)
+            elif keep.any():
+                parts.append(replace(part, triangulation=part.triangulation.take(keep).compact()))
+        return replace(model, parts=tuple(parts), topology=None, native=None)
+
     def body_size(self, model: Assembly) -> Assembly | Triangulation:
         """What tolerances are born from: the model without what bounds the domain."""
         if not self.aside.any() or self.aside.all():
@@ -247,30 +261,3 @@ def _around(mesh: Triangulation, pieces: Pieces, point: Array) -> BoolArray:
         if abs(winding(corners[own], point)) > 0.5:
             around |= own
     return around
-
-
-def on_planes(
-    mesh: Triangulation, planes: tuple[SymmetryPlane, ...], near: float, rim: BoolArray | None = None
-) -> tuple[Triangulation, IntArray, float]:
-    """Vertices near a symmetry plane put on it exactly.
-
-    Parameters
-    ----------
-    near : the distance up to which a vertex is on the plane
-    rim : (n,) the vertices that may move; None for all
-
-    Returns
-    -------
-    The triangulation, the vertices that moved, and the farthest move.
-    """
-    points = mesh.vertices.copy()
-    for plane in planes:
-        close = np.abs(points[:, plane.axis] - plane.value) <= near
-        if rim is not None:
-            close &= rim
-        points[close, plane.axis] = plane.value
-    move = np.linalg.norm(points - mesh.vertices, axis=1)
-    moved = np.flatnonzero(move > 0.0)
-    if not len(moved):
-        return mesh, moved, 0.0
-    return replace(mesh, vertices=points), moved, float(move.max())

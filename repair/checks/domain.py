@@ -115,23 +115,25 @@ def _mixed_units(exam: Examination) -> list[Defect]:
         return []
     k = int(np.argmax(jump))
     small, large = order[: k + 1], order[k + 1 :]
-    factor, words = min(_FACTORS, key=lambda entry: abs(np.log(entry[0] * size[small].max() / size[large].max())))
-    ratio = factor * size[small].max() / size[large].max()
-    if not 1.0 / ALIKE <= ratio <= ALIKE:
-        return []
-    # in one unit, both groups must lie near each other, and nearer than they do now in shares of their size
     boxes = [np.stack([low[g].min(axis=0), high[g].max(axis=0)]) for g in (small, large)]
-    scaled = factor * boxes[0]
-    apart = np.maximum(0.0, np.maximum(scaled[0] - boxes[1][1], boxes[1][0] - scaled[1]))
-    if np.linalg.norm(apart) > 0.5 * size[large].max():
+    found = ""
+    for factor, words in _FACTORS:
+        scaled = factor * boxes[0]
+        apart = np.maximum(0.0, np.maximum(scaled[0] - boxes[1][1], boxes[1][0] - scaled[1]))
+        alike = 1.0 / ALIKE <= factor * size[small].max() / size[large].max() <= ALIKE
+        if alike and np.linalg.norm(apart) <= 0.5 * size[large].max():
+            found = words
+            break
+    if not found:
         return []
     few = small if len(small) <= len(large) else large
     box = boxes[0] if few is small else boxes[1]
-    some = tuple(dict.fromkeys(names[i] for i in few))
+    # of two alone either may be the wrong one
+    some = tuple(dict.fromkeys(names[i] for i in (order if len(small) == len(large) else few)))
     parts = ", ".join(some[:5]) + (", …" if len(some) > 5 else "")
     message = (
-        f"{parts}: {jump[k]:.4g} times {'smaller' if few is small else 'larger'} than the next of the other parts; "
-        f"with {words} all would be alike in size and place, so the units are probably mixed"
+        f"{parts}: sizes jump by {jump[k]:.4g} times from one part to the next; "
+        f"with {found} all would be alike in size and place, so the units are probably mixed"
     )
     extent = float(np.linalg.norm(box[1] - box[0]))
     return [Defect("unit", "warning", box.mean(axis=0), extent, some, len(few), message, box)]
