@@ -53,6 +53,7 @@ class Defect:
     message : one sentence with numbers
     box : (2, 3) its bounding box
     id : "kind-hash", unique in its diagnosis and the same for the same place in a re-ordered model (`fingerprint`)
+    curves : polylines (n, 3) where surfaces cross, for crossings; none otherwise
     """
 
     kind: str
@@ -64,10 +65,12 @@ class Defect:
     message: str
     box: Array
     id: str = ""
+    curves: tuple[Array, ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "where", frozen(self.where, np.float64))
         object.__setattr__(self, "box", frozen(self.box, np.float64))
+        object.__setattr__(self, "curves", tuple(frozen(points, np.float64) for points in self.curves))
 
     @property
     def fingerprint(self) -> Fingerprint:
@@ -86,6 +89,7 @@ class Defect:
             "count": int(self.count),
             "message": self.message,
             "box": self.box.tolist(),
+            **({"curves": [points.tolist() for points in self.curves]} if self.curves else {}),
         }
 
 

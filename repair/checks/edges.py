@@ -73,6 +73,7 @@ def _unmerged(exam: Examination) -> tuple[Defect, ...]:
     still = edge_keys(after[which, corner], after[which, (corner + 1) % 3], len(exam.welded.vertices))
     body = exam.body_adjacency.edges[exam.body_adjacency.free]
     healed = ~np.isin(still, edge_keys(body[:, 0], body[:, 1], len(exam.welded.vertices)))
+    healed &= np.isin(which, exam.body_index)  # what was left out did not heal
     if not healed.any():
         return ()
     place = points[np.stack([tail, head], axis=1)[healed]]

@@ -94,24 +94,45 @@ class Examination:
         return again & ~self.collapsed
 
     @cached_property
+    def flat(self) -> BoolArray:
+        """(m,) triangles of `raw` with three corners but no height beyond the rounding of their coordinates."""
+        corners = self.raw.corners
+        longest = np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2).max(axis=1)
+        area = self.raw.areas
+        height = np.divide(2.0 * area, longest, out=np.zeros_like(area), where=longest > 0.0)
+        rounding = 4.0 * float(np.finfo(np.float64).eps) * float(np.abs(self.raw.bounds).max())
+        return np.asarray((height <= rounding) & ~two_corners(self.merged.triangles))
+
+    @cached_property
     def body_index(self) -> IntArray:
         """(b,) the triangles of `body`."""
         return self._cleaned[1]
 
     @cached_property
     def body(self) -> Triangulation:
-        """`welded` without collapsed triangles, with one copy of doubled ones, none where they are a wall inside."""
+        """`welded` without collapsed triangles, with one copy of doubled ones, none where they are a wall inside.
+
+        Triangles without height that merely hang on others' edges are left out as well.
+        """
         return self._cleaned[0]
 
     @cached_property
     def _cleaned(self) -> tuple[Triangulation, IntArray]:
         from patchwright.repair.clean import drop_collapsed, drop_duplicates
 
-        if not (self.collapsed.any() or self.duplicate.any()):
+        if not (self.collapsed.any() or self.duplicate.any() or self.flat.any()):
             return self.welded, np.arange(len(self.welded))
         whole = drop_collapsed(self.welded)
         single = drop_duplicates(whole.triangulation)
-        return single.triangulation, whole.parents[single.parents]
+        index = whole.parents[single.parents]
+        flat = self.flat[index]
+        if flat.any():
+            adjacency = Adjacency.of(single.triangulation)
+            around = adjacency.triangle_edges
+            free = np.count_nonzero(adjacency.free[around], axis=1)
+            flap = flat & ((free >= 2) | ((free > 0) & adjacency.non_manifold[around].any(axis=1)))
+            return single.triangulation.take(~flap), index[~flap]
+        return single.triangulation, index
 
     @cached_property
     def body_adjacency(self) -> Adjacency:
@@ -155,6 +176,18 @@ class Examination:
                 own = self.component[rim.triangles[0]]
                 wide[own] = max(wide[own], rim.diameter)
         return np.asarray(wide <= SMALL_OPENING * np.sqrt(area))
+
+    def run_past(self, label: IntArray) -> BoolArray:
+        """(k,) pairs of components (k, 2) whose rims run past each other: what comes of it is one overlap."""
+        count = len(self.component_closed)
+        some = [
+            (self.component[rim.triangles[0]], self.component[self.rims[rim.overlaps].triangles[0]])
+            for rim in self.rims
+            if rim.overlaps is not None
+        ]
+        pair = np.sort(np.array(some, dtype=np.int64).reshape(-1, 2), axis=1)
+        own = np.sort(label, axis=1)
+        return np.asarray((own[:, 0] != own[:, 1]) & np.isin(own @ [count, 1], pair @ [count, 1]))
 
     @cached_property
     def crossing_pairs(self) -> IntArray:

@@ -24,10 +24,8 @@ def faces(exam: Examination) -> Finding:
     longest = edges.max(axis=1)
     area = exam.raw.areas
     height = np.divide(2.0 * area, longest, out=np.zeros_like(area), where=longest > 0.0)
-    low, high = exam.raw.bounds
-    rounding = 4.0 * float(np.finfo(np.float64).eps) * float(max(np.abs(low).max(), np.abs(high).max()))
     collapsed = two_corners(exam.merged.triangles)
-    flat = (height <= rounding) & ~collapsed
+    flat = exam.flat
     welded_away = exam.collapsed & ~collapsed & ~flat
     needle = (longest > NEEDLE * height) & ~collapsed & ~flat & ~welded_away
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
-from patchwright.models.arrays import Array, IntArray
+from patchwright.models.arrays import Array, BoolArray, IntArray
 from patchwright.repair.checks.edges import edge_keys
 from patchwright.repair.checks.examination import Examination
 from patchwright.repair.checks.regions import plural, regional
@@ -13,6 +15,8 @@ from patchwright.repair.checks.registry import Finding, check
 INNER = 0.02  # of an edge's length: nearer to an end, a vertex belongs to that end
 SAG = 0.05  # of an edge's length: a vertex of the finer side lies off the coarser side's chord by that much
 OPPOSED = 0.5  # cosine: the surfaces on both sides of a t-junction go on into each other
+MEETS = 0.5  # of a vertex's distance from the edge: the edge's own ends are that near the other side, or it is a gap
+STRAIGHT = 1.2  # arc to chord along one seam
 MOST_VERTICES = 200_000  # free edges up to which t-junctions are looked for
 
 
@@ -36,7 +40,11 @@ def t_junctions(exam: Examination) -> Finding:
 
 
 def find_junctions(exam: Examination) -> IntArray:
-    """(k, 3) vertex, triangle of `body` and its edge 0..2 that the vertex lies on, along the rims."""
+    """(k, 3) vertex, triangle of `body` and its edge 0..2 that the vertex lies on, along the rims.
+
+    On the edge to round-off, or beside it by the sag of a coarser chord; then the edge's own ends lie on the other
+    side. Two sides with a gap between them have no t-junctions, however narrow it is.
+    """
     from scipy.spatial import cKDTree
 
     body = exam.oriented.triangulation
@@ -66,10 +74,50 @@ def find_junctions(exam: Examination) -> IntArray:
     t = np.einsum("ij,ij->i", local, along[edge]) / np.maximum(length[edge] ** 2, np.finfo(float).tiny)
     apart: Array = np.linalg.norm(local - t[:, None] * along[edge], axis=1)
     facing = -np.einsum("ij,ij->i", ahead[found], outward[edge]) >= OPPOSED * np.linalg.norm(ahead[found], axis=1)
-    on = (t > INNER) & (t < 1.0 - INNER) & (apart <= reach[edge]) & (vertex != start[edge]) & (vertex != end[edge])
-    on &= facing | (apart <= exam.tolerance.gap)
-    on &= ~(triangles[which[edge]] == vertex[:, None]).any(axis=1)
+    close = apart <= exam.tolerance.gap
+    # on the edge to round-off, a vertex that was not merged with an end does not belong to it
+    inner = np.where(close, 0.0, INNER)
+    strange = (vertex != start[edge]) & (vertex != end[edge])
+    strange &= ~(triangles[which[edge]] == vertex[:, None]).any(axis=1)
+    on = strange & (t > inner) & (t < 1.0 - inner) & (apart <= reach[edge]) & (facing | close)
+    beside = np.flatnonzero(on & ~close)
+    if len(beside):
+        # how far the other side's edges pass by each rim vertex
+        foot = local - np.clip(t, 0.0, 1.0)[:, None] * along[edge]
+        passing = np.full(len(points), np.inf)
+        np.minimum.at(passing, vertex[strange & facing], np.linalg.norm(foot, axis=1)[strange & facing])
+        chains = _Chains.of(exam)
+        for end_of in (start, end):
+            tip = end_of[edge[beside]]
+            meets = passing[tip] <= MEETS * apart[beside]
+            on[beside] &= meets | chains.joined(tip, vertex[beside])
     return np.stack([vertex[on], which[edge[on]], corner[edge[on]]], axis=1)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Chains:
+    """Where the rims' vertices lie along their rims: (n,) rim (-1 for none) and arc length, (r,) perimeters."""
+
+    points: Array
+    rim: IntArray
+    place: Array
+    perimeter: Array
+
+    @classmethod
+    def of(cls, exam: Examination) -> _Chains:
+        points = exam.body.vertices
+        rim, place = np.full(len(points), -1, dtype=np.int64), np.zeros(len(points))
+        for k, one in enumerate(exam.rims):
+            step = np.linalg.norm(np.diff(points[one.loop], axis=0), axis=1)
+            rim[one.loop], place[one.loop] = k, np.concatenate([[0.0], np.cumsum(step)])
+        return cls(points, rim, place, np.array([one.perimeter for one in exam.rims]))
+
+    def joined(self, a: IntArray, b: IntArray) -> BoolArray:
+        """(k,) whether the rim leads from a to b nearly straight: they are neighbours on one seam."""
+        same = (self.rim[a] >= 0) & (self.rim[a] == self.rim[b])
+        way = np.abs(self.place[a] - self.place[b])
+        way = np.minimum(way, self.perimeter[self.rim[a]] - way)
+        return np.asarray(same & (way <= STRAIGHT * np.linalg.norm(self.points[a] - self.points[b], axis=1)))
 
 
 def _free_edges(triangles: IntArray, free: IntArray, count: int) -> tuple[IntArray, IntArray, IntArray, IntArray]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -50,6 +50,7 @@ def regional(
     *,
     links: IntArray | None = None,
     labels: IntArray | None = None,
+    curves: Sequence[tuple[Array, ...]] | None = None,
 ) -> list[Defect]:
     """One defect per connected region.
 
@@ -60,6 +61,7 @@ def regional(
     triangles : (k,) a triangle (index into `exam.raw`) each belongs to, for the parts' names
     say : the message, from the count and the extent
     links, labels : further pairs that belong together, or the regions themselves when they are known
+    curves : the curves that belong to each region of `labels`
     """
     if not len(elements):
         return []
@@ -85,6 +87,7 @@ def regional(
                 int(counts[r]),
                 say(int(counts[r]), float(size[r])),
                 np.stack([low[r], high[r]]),
+                curves=() if curves is None else curves[r],
             )
         )
     rest = rank[MOST:]

@@ -42,6 +42,7 @@ _MODULES = (
     "components",
     "rims",
     "crossings",
+    "layers",
     "thin",
     "domain",
     "cad",

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from patchwright.models.arrays import Array, IntArray
 from patchwright.repair.checks.examination import Examination, box_of
 from patchwright.repair.checks.regions import MOST, plural
 from patchwright.repair.checks.registry import Finding, check
+from patchwright.repair.checks.rims_ahead import Ahead, facing_surfaces
 from patchwright.repair.diagnosis import Defect, Severity
 from patchwright.repair.rims import Rim
 
@@ -38,7 +41,13 @@ def rims(exam: Examination) -> Finding:
         for i, rim in enumerate(found)
     ]
     groups = [group for group in rim_groups(found) if not all(told[i] for i in group)]
-    defects = [_defect(exam, found, group, points) for group in groups]
+    near = facing_surfaces(exam)
+    defects = []
+    for group in groups:
+        defect = _defect(exam, found, group, points)
+        if len(group) == 1 and defect.kind == "opening" and defect.severity != "info" and group[0] in near:
+            defect = _between_parts(exam, defect, near[group[0]])
+        defects.append(defect)
     return Finding(tuple(most_of_each(exam, defects)), figures)
 
 
@@ -104,6 +113,20 @@ def _defect(exam: Examination, found: tuple[Rim, ...], group: list[int], points:
     kind, severity, size, message = describe(exam, some, points[loops], parts)
     edges = sum(len(rim.triangles) for rim in some)
     return Defect(kind, severity, centre, size, parts, edges, message, box_of(points[loops]))
+
+
+def _between_parts(exam: Examination, defect: Defect, near: Ahead) -> Defect:
+    """The opening as what it is: the gap between a part's end and the surface of another part."""
+    other = exam.parts_of(exam.body_index[near.triangles])
+    parts = tuple(dict.fromkeys((*defect.parts, *other)))
+    message = (
+        f"a gap between the end of {', '.join(defect.parts) or 'a body'} and the surface of "
+        f"{', '.join(other) or 'another'}, {exam.length(near.width)} wide in the median and at most {near.widest:.3g}"
+    )
+    severity: Severity = "error"
+    if kept := exam.surroundings.keeps_gaps(parts):
+        severity, message = "info", f"{message}; {kept}"
+    return replace(defect, kind="gap", severity=severity, size=near.width, parts=parts, message=message)
 
 
 def _coincident(exam: Examination, found: tuple[Rim, ...]) -> list[bool]:
