@@ -1,8 +1,9 @@
 """Curves of two surfaces cut back to the faces' trims.
 
 A curve ends where its (u, v) image crosses a trim loop: crossings of the polylines seed Newton's method on both curves.
-Pieces are kept when their middle lies inside the loops (even-odd rule) or on them. Limit: a curve that runs along a
-loop and leaves it smoothly is cut where the polylines cross, not where it leaves. Overlaps are not cut.
+Pieces are kept when their middle lies inside the loops (even-odd rule) or on them. An overlap stays when it lies within
+the face and goes when it lies outside. Limits: a curve that runs along a loop and leaves it smoothly is cut where the
+polylines cross, not where it leaves; an overlap that a loop would cut is handed back as unresolved.
 """
 
 from __future__ import annotations
@@ -17,11 +18,12 @@ from patchwright.models.knots import divided
 from patchwright.models.nurbs_curve import NurbsCurve
 from patchwright.models.surface import Surface
 from patchwright.ssi.chained import appended
-from patchwright.ssi.intersection import Contact, Intersection, IntersectionCurve
+from patchwright.ssi.intersection import Box, Contact, Intersection, IntersectionCurve, Overlap, Unresolved
 from patchwright.ssi.operands import Loops
 
 PER_SPAN = 24  # chords of a polyline in each knot span
 NEWTON = 12
+EVERYWHERE: Box = ((-np.inf, np.inf), (-np.inf, np.inf))
 ON = 1e-8  # of the loops' extent in space: what is nearer than this to a loop lies on it
 
 
@@ -33,12 +35,20 @@ def trimmed(found: Intersection, surface: Surface, loops: Loops | None, side: in
     surface, loops : the face; None as loops keeps everything
     side : 0 when the face is the first of the two surfaces, 1 when it is the second
     """
-    if loops is None or not (found.curves or found.points):
+    if loops is None or not (found.curves or found.points or found.overlaps):
         return found
     moved = [[[_moved(curve, shift) for curve in loop] for loop in loops] for shift in _shifts(surface)]
     curves = tuple(piece for curve in found.curves for piece in _cut(curve, surface, moved, side))
     points = tuple(p for p in found.points if _keeps(p, surface, moved, side))
-    return replace(found, curves=curves, points=points)
+    inside = [_holds(overlap, surface, moved, side) for overlap in found.overlaps]
+    overlaps = tuple(o for o, state in zip(found.overlaps, inside, strict=True) if state)
+    boxes = (surface.domain, EVERYWHERE) if side == 0 else (EVERYWHERE, surface.domain)
+    open_ = tuple(
+        Unresolved(*boxes, "an overlap is not cut back to the face's trims", o.surfaces)
+        for o, state in zip(found.overlaps, inside, strict=True)
+        if state is None
+    )
+    return replace(found, curves=curves, points=points, overlaps=overlaps, unresolved=found.unresolved + open_)
 
 
 Moved = Sequence[Sequence[Sequence[NurbsCurve]]]  # loops of curves, once for every period of the surface
@@ -47,6 +57,26 @@ Moved = Sequence[Sequence[Sequence[NurbsCurve]]]  # loops of curves, once for ev
 def _keeps(contact: Contact, surface: Surface, moved: Moved, side: int) -> bool:
     uv = contact.uv_a if side == 0 else contact.uv_b
     return uv is None or bool(_inside(np.array([uv]), surface, moved)[0])
+
+
+def _holds(overlap: Overlap, surface: Surface, moved: Moved, side: int) -> bool | None:
+    """Whether an overlap lies on the face; None when a part of it does, or its boundary is not known here."""
+    images = [c.uv_a if side == 0 else c.uv_b for c in overlap.boundary]
+    border = [uv for uv in images if uv is not None]
+    if not border or len(border) < len(images):
+        return None
+    lines = [uv(divided(uv.breaks, PER_SPAN)) for uv in border]
+    on_face = _inside(np.concatenate(lines), surface, moved)
+    rim = np.concatenate([_polyline(curve)[0] for loops in moved for loop in loops for curve in loop])
+    tails, heads = np.concatenate([p[:-1] for p in lines]), np.concatenate([p[1:] for p in lines])
+    within = _rays_cut(rim, tails, heads) % 2 == 1
+    reach = ON * float(np.ptp(np.concatenate(lines), axis=0).max())
+    if within.any():  # on the overlap's border is not within it
+        away = np.min([uv.closest(rim[within]).distance for uv in border], axis=0)
+        within = away > reach
+    if within.any():
+        return None
+    return True if on_face.all() else None if on_face.any() else False
 
 
 def _cut(curve: IntersectionCurve, surface: Surface, moved: Moved, side: int) -> list[IntersectionCurve]:
@@ -131,7 +161,8 @@ def _inside(uv: Array, surface: Surface, moved: Moved) -> BoolArray:
                 # with the points' feet for vertices the polygon has them on the same side as the curve
                 t = np.unique(np.concatenate([divided(curve.breaks, PER_SPAN), foot]))
                 polygon.append(curve(t)[:-1])
-            crossings += _rays_cut(uv, np.concatenate(polygon))
+            corners = np.concatenate(polygon)
+            crossings += _rays_cut(uv, corners, np.roll(corners, -1, axis=0))
         out |= crossings % 2 == 1
     return out
 
@@ -144,13 +175,12 @@ def _together(uv: Array, other: Array, surface: Surface, low: Array, high: Array
     return np.asarray(apart <= ON * size)
 
 
-def _rays_cut(uv: Array, polygon: Array) -> IntArray:
-    """(n,) how many edges of a polygon the ray along u from each point cuts."""
-    after = np.roll(polygon, -1, axis=0)
-    spans = (polygon[None, :, 1] > uv[:, 1:]) != (after[None, :, 1] > uv[:, 1:])
+def _rays_cut(uv: Array, tails: Array, heads: Array) -> IntArray:
+    """(n,) how many of the edges from `tails` to `heads` the ray along u from each point cuts."""
+    spans = (tails[None, :, 1] > uv[:, 1:]) != (heads[None, :, 1] > uv[:, 1:])
     with np.errstate(divide="ignore", invalid="ignore"):
-        share = (uv[:, 1:] - polygon[:, 1]) / (after[:, 1] - polygon[:, 1])
-        x = polygon[:, 0] + share * (after[:, 0] - polygon[:, 0])
+        share = (uv[:, 1:] - tails[:, 1]) / (heads[:, 1] - tails[:, 1])
+        x = tails[:, 0] + share * (heads[:, 0] - tails[:, 0])
     return np.asarray((spans & (x > uv[:, :1])).sum(axis=1), dtype=np.int64)
 
 

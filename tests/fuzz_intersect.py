@@ -3,9 +3,10 @@
     python tests/fuzz_intersect.py --pairs 10000 --seed 0
 
 Each pair is solved in a child process; one that takes longer than the limit or dies is counted and the child replaced.
-Judged: every number finite; every curve within its residual of both surfaces; no errors but `GeometryError`; and, where
-one surface has an implicit equation and the answer is complete, that curves lie near every place where the equation
-changes sign strongly along a grid on the other surface.
+Judged: every number finite; every curve within its residual of both surfaces, by its parameters, by the surface's
+equation where it has one, and by the distance from a mesh; no errors but `GeometryError`; and, where one surface has an
+equation and the answer is complete, that curves lie near every place where the equation changes sign strongly along a
+grid on the other surface or along the edges of a mesh.
 """
 
 from __future__ import annotations
@@ -13,18 +14,22 @@ from __future__ import annotations
 import argparse
 import multiprocessing
 import multiprocessing.connection
+import signal
 import time
 from collections import Counter
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from patchwright.models import Cone, Cylinder, GeometryError, NurbsSurface, Plane, Sphere, Torus, Triangulation
 from patchwright.models.knots import greville, uniform_knots
+from patchwright.models.tree import Tree
 from patchwright.ssi import Intersection, intersect
 
-LIMIT = 30.0  # seconds for a pair
+LIMIT = 30.0  # seconds of its own time for a pair
+PATIENCE = 600.0  # seconds on the clock, for a process that waits
 GRID = 41  # places a side at which the oracle asks
 KINDS = ("plane", "cylinder", "cone", "sphere", "torus", "graph", "rational", "kinked", "closed", "mesh")
 Thing = Any
@@ -152,11 +157,15 @@ def judged(a: Thing, b: Thing, found: Intersection) -> str:
         if not (np.isfinite(points).all() and np.isfinite(curve.residual)):
             return "a curve is not finite"
         for uv, thing in ((curve.uv_a, a), (curve.uv_b, b)):
+            allowed = max(4.0 * curve.residual, 1e-12 * (size + np.abs(points).max()))
+            off = _off(thing, points)
+            if not off <= allowed:
+                return f"a curve is {off / size:.1e} of the size off a {type(thing).__name__}"
             if uv is None:
                 continue
             w = np.clip(uv(np.linspace(*uv.domain, 201)), *np.array(thing.domain).T)
             far = float(np.linalg.norm(thing(w[:, 0], w[:, 1]) - points, axis=1).max())
-            if not far <= max(4.0 * curve.residual, 1e-12 * (size + np.abs(points).max())):
+            if not far <= allowed:
                 return f"a curve is {far / size:.1e} of the size off a surface and says {curve.residual / size:.1e}"
     if any(not np.isfinite(p.point).all() for p in found.points):
         return "a point is not finite"
@@ -169,12 +178,45 @@ def judged(a: Thing, b: Thing, found: Intersection) -> str:
     return ""
 
 
-def _missed(one: Thing, other: Thing, found: Intersection, size: float) -> str:
-    """Whether a cell of a grid on `other` in which the equation of `one` changes sign is far from every curve."""
-    from scipy.spatial import cKDTree
+def _off(thing: Thing, points: np.ndarray) -> float:
+    """Largest distance of points from an analytic surface without its ranges, or from a mesh; 0 for others."""
+    if isinstance(thing, Triangulation):
+        return float(Tree.of(thing).closest(points).distance.max())
+    if isinstance(thing, Plane | Sphere | Torus | Cylinder):
+        return float(np.abs(_equation(thing, points, 0.0)[0]).max())
+    return 0.0
 
-    if not isinstance(one, Plane | Sphere | Torus | Cylinder) or isinstance(other, Triangulation):
+
+def _missed(one: Thing, other: Thing, found: Intersection, size: float) -> str:
+    """Whether a place on `other` at which the equation of `one` changes sign is far from every curve."""
+    if not isinstance(one, Plane | Sphere | Torus | Cylinder) or found.overlaps:
         return ""
+    middle, reach = (_edges_across if isinstance(other, Triangulation) else _cells_across)(one, other, size)
+    if not len(middle):
+        return ""
+    cloud = [c.curve(np.linspace(*c.curve.domain, 801)) for c in found.curves] + [
+        np.array([p.point for p in found.points]).reshape(-1, 3)
+    ]
+    places = np.concatenate(cloud)
+    if not len(places):
+        return f"nothing found, the equation changes sign in {len(middle)} places"
+    far = cKDTree(places).query(middle)[0] - reach
+    return (
+        f"a place where the equation changes sign is {far.max() / size:.1e} off every curve" if far.max() > 0.0 else ""
+    )
+
+
+def _edges_across(one: Thing, mesh: Triangulation, size: float) -> tuple[np.ndarray, np.ndarray]:
+    """Middles of a mesh's edges along which the equation of `one` changes sign, and how far a curve may be."""
+    ends = mesh.vertices[np.stack([mesh.triangles, np.roll(mesh.triangles, -1, axis=1)], axis=-1).reshape(-1, 2)]
+    height, within = _equation(one, ends, size)
+    across = (height[:, 0] * height[:, 1] < 0.0) & (np.abs(height).min(axis=1) > 1e-7 * size) & within.all(axis=1)
+    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    return ends[across].mean(axis=1), length[across] + 0.02 * size
+
+
+def _cells_across(one: Thing, other: Thing, size: float) -> tuple[np.ndarray, np.ndarray]:
+    """Middles of cells of a grid on `other` in which the equation of `one` changes sign, and how far a curve may be."""
     (u0, u1), (v0, v1) = other.domain
     u, v = np.meshgrid(np.linspace(u0, u1, GRID), np.linspace(v0, v1, GRID), indexing="ij")
     points = other(u.ravel(), v.ravel()).reshape(GRID, GRID, 3)
@@ -185,24 +227,14 @@ def _missed(one: Thing, other: Thing, found: Intersection, size: float) -> str:
     clear = np.min([np.abs(h) for h in (height[:-1, :-1], height[1:, :-1], height[1:, 1:], height[:-1, 1:])], axis=0)
     inner = within[:-1, :-1] & within[1:, :-1] & within[1:, 1:] & within[:-1, 1:]
     changes = (np.max(signs, axis=0) > 0) & (np.min(signs, axis=0) < 0) & inner & (clear > 1e-7 * size)
-    if not changes.any() or found.overlaps:
-        return ""
-    cloud = [c.curve(np.linspace(*c.curve.domain, 801)) for c in found.curves] + [
-        np.array([p.point for p in found.points]).reshape(-1, 3)
-    ]
-    places = np.concatenate(cloud)
-    middle = np.mean(corner, axis=0)[changes]
-    if not len(places):
-        return f"nothing found, {int(changes.sum())} cells change sign"
-    far = cKDTree(places).query(middle)[0] - 1.5 * cell[changes] - 0.02 * size
-    return f"a cell that changes sign is {far.max() / size:.1e} of the size off every curve" if far.max() > 0.0 else ""
+    return np.mean(corner, axis=0)[changes], 1.5 * cell[changes] + 0.02 * size
 
 
 def _equation(one: Thing, points: np.ndarray, size: float) -> tuple[np.ndarray, np.ndarray]:
     """Signed distance to a surface, and where its foot lies well inside the ranges."""
     local = points - (one.center if isinstance(one, Sphere | Torus) else one.origin)
     if isinstance(one, Sphere):
-        return np.linalg.norm(local, axis=-1) - one.radius, np.ones(points.shape[:2], dtype=bool)
+        return np.linalg.norm(local, axis=-1) - one.radius, np.ones(points.shape[:-1], dtype=bool)
     z = one.normal if isinstance(one, Plane) else one.axis
     up = local @ z
     if isinstance(one, Plane):
@@ -213,7 +245,7 @@ def _equation(one: Thing, points: np.ndarray, size: float) -> tuple[np.ndarray, 
     rho = np.linalg.norm(local - up[..., None] * z, axis=-1)
     if isinstance(one, Cylinder):
         return rho - one.radius, (up > one.v[0] + 0.05 * size) & (up < one.v[1] - 0.05 * size)
-    return np.hypot(rho - one.major_radius, up) - one.minor_radius, np.ones(points.shape[:2], dtype=bool)
+    return np.hypot(rho - one.major_radius, up) - one.minor_radius, np.ones(points.shape[:-1], dtype=bool)
 
 
 def _extent(thing: Thing) -> float:
@@ -224,14 +256,14 @@ def _extent(thing: Thing) -> float:
 def solved(seed: int, index: int) -> Result:
     """One pair, here."""
     kinds, a, b = pair(seed, index)
-    begin = time.perf_counter()
+    begin = time.process_time()
     try:
         found = intersect(a, b)
     except GeometryError as error:
-        return Result(kinds, "refused", str(error), time.perf_counter() - begin)
+        return Result(kinds, "refused", str(error), time.process_time() - begin)
     except Exception as error:  # noqa: BLE001
-        return Result(kinds, "crash", repr(error)[:200], time.perf_counter() - begin)
-    seconds = time.perf_counter() - begin
+        return Result(kinds, "crash", repr(error)[:200], time.process_time() - begin)
+    seconds = time.process_time() - begin
     wrong = judged(a, b, found)
     if wrong:
         return Result(kinds, "wrong", wrong, seconds)
@@ -241,8 +273,15 @@ def solved(seed: int, index: int) -> Result:
 
 
 def _child(seed: int, link: multiprocessing.connection.Connection) -> None:
+    """Say that everything is compiled, then solve what is asked."""
+    for first, second in ((0, 5), (9, 3)):
+        rng = np.random.default_rng(0)
+        intersect(*(_made(KINDS[k], rng, np.zeros(3), np.eye(3)) for k in (first, second)))
+    link.send(None)
     while True:
-        link.send(solved(seed, link.recv()))
+        index = link.recv()
+        signal.setitimer(signal.ITIMER_VIRTUAL, LIMIT)  # of this process' own time; its end ends the process
+        link.send(solved(seed, index))
 
 
 class _Child:
@@ -258,16 +297,17 @@ class _Child:
         self.process = context.Process(target=_child, args=(self.seed, far), daemon=True)
         self.process.start()
         far.close()
+        self.link.recv()
 
     def solve(self, index: int) -> Result:
         self.link.send(index)
-        ready = self.link.poll(LIMIT + (120.0 if index == 0 else 0.0))  # the first one may have to compile
-        if ready:
+        if self.link.poll(PATIENCE):
             try:
                 answer: Result = self.link.recv()
                 return answer
             except EOFError:
-                state = "crash"
+                self.process.join()
+                state = "hang" if self.process.exitcode == -signal.SIGVTALRM else "crash"
         else:
             state = "hang"
         self.process.kill()
@@ -281,10 +321,13 @@ def main() -> None:
     options.add_argument("--pairs", type=int, default=10000)
     options.add_argument("--seed", type=int, default=0)
     options.add_argument("--start", type=int, default=0)
+    options.add_argument("--kind", help="only pairs with this kind of surface")
     options = options.parse_args()
     child, states, slow = _Child(options.seed), Counter[str](), 0.0
     kinds: Counter[tuple[str, str]] = Counter()
     for index in range(options.start, options.start + options.pairs):
+        if options.kind and options.kind not in pair(options.seed, index)[0].split("-"):
+            continue
         got = child.solve(index)
         states[got.state] += 1
         kinds[got.kinds, got.state] += 1

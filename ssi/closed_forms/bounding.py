@@ -44,6 +44,11 @@ def clip(a: Surface, b: Surface) -> Pair:
     return (one, other) if first is a else (other, one)
 
 
+def clip_to(surface: Surface, box: Array) -> Surface:
+    """The surface with finite ranges: of an unbounded one what reaches beyond a box (2, 3) by a margin."""
+    return surface if _bounded(surface) else _cut(surface, _corners(box))
+
+
 def _bounded(surface: Surface) -> bool:
     return bool(np.isfinite(surface.domain).all())
 

@@ -69,6 +69,22 @@ def test_trims_leave_one_arc_of_a_loop_whole_where_the_loop_begins():
     assert not any(c.closed for c in found.curves)
 
 
+@pytest.mark.parametrize(("half", "area"), [(0.5, [1.0]), (1.0, [4.0]), (1.4, None), (None, [])])
+def test_overlaps_are_kept_dropped_or_handed_back_by_the_trims(half, area):
+    """A mesh square in the plane of a face trimmed to the square of half-side 1: inside, equal, across, outside."""
+    at, side = (np.zeros(3), half) if half else (np.array([2.2, 0, 0]), 0.5)
+    corners = at + side * np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
+    found = intersect(
+        Part("floor", NOTHING, FLOOR, trims=(square(1.0),)), Triangulation(corners, np.array([[0, 1, 2], [0, 2, 3]]))
+    )
+    if area is None:
+        assert not found.complete
+        assert "trims" in found.unresolved[0].reason
+    else:
+        assert found.complete
+        assert [o.area for o in found.overlaps] == pytest.approx(area, rel=1e-14)
+
+
 def test_contacts_outside_the_trims_are_dropped():
     face = Part("floor", NOTHING, FLOOR, trims=(square(1.0),))
     inside, outside = Sphere([0.5, 0.5, 1.0], 1.0), Sphere([1.5, 0.5, 1.0], 1.0)
@@ -89,6 +105,20 @@ def test_meshes_and_surfaces_mix():
         assert found.length == pytest.approx(2.0, rel=1e-9)
     assert intersect(FLOOR, sheet).curves[0].uv_a is not None
     assert intersect(sheet, FLOOR).curves[0].uv_a is None
+
+
+def test_unbounded_surfaces_are_clipped_to_a_mesh():
+    corners = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (0.0, 1.0)])
+    quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]]
+    rows = [row for a, b, c, d in quads for row in ([a, b, c], [a, c, d])]
+    box = Triangulation(corners, np.array(rows))
+    for found in (intersect(box, Plane([0, 0, 0.25], [0, 0, 1])), intersect(Plane([0, 0, 0.25], [0, 0, 1]), box)):
+        assert found.complete
+        assert found.length == pytest.approx(8.0, rel=1e-14)
+    tube = intersect(box, Cylinder([0.1, 0, 0.2], [0, 0, 1], 0.5))
+    assert tube.complete
+    assert [c.closed for c in tube.curves] == [True, True]
+    assert tube.length == pytest.approx(2 * np.pi, rel=1e-9)  # two circles of radius 1/2
 
 
 @pytest.mark.parametrize("bad", [0.0, -1.0, np.nan])
