@@ -12,20 +12,18 @@ from dataclasses import replace
 
 import numpy as np
 
-from patchwright.models.analytic import Cylinder, Plane, Sphere
 from patchwright.models.errors import ParameterError
 from patchwright.models.surface import Surface
 from patchwright.models.triangulation import Triangulation
 from patchwright.ssi.chained import chained
 from patchwright.ssi.embedded import is_embedded
-from patchwright.ssi.intersection import Intersection, Unresolved
+from patchwright.ssi.intersection import Intersection
 from patchwright.ssi.operands import Input, Operand, meeting, operands
 from patchwright.ssi.trimmed import trimmed
 from patchwright.ssi.triple_points import triple_points
 
 SHARE = 1e-10  # of the smaller surface's size: the tolerance nobody gave
 MEETING = 1e-8  # of the curves' extent: ends nearer than this are one place
-ONCE = (Plane, Cylinder, Sphere)  # surfaces that never meet themselves, seams apart
 Progress = Callable[[str, float], None]
 
 
@@ -65,7 +63,7 @@ def intersect(
     if alone:
         for i, item in enumerate(items):
             say("self-intersections", i / len(items))
-            found.append(_numbered(_self(item), i, i))
+            found.append(_numbered(_self(item, tolerance), i, i))
     sizes = [item.size for item in items if np.isfinite(item.size)]
     widest = tolerance or SHARE * max(sizes, default=1.0)
     pairs = meeting(items, alone, widest)
@@ -92,7 +90,6 @@ def _tolerance(a: Operand, b: Operand, given: float | None) -> float:
 
 def _pair(a: Operand, b: Operand, given: float | None) -> Intersection:
     """One pair by the method for its kinds, cut back to the trims."""
-    from patchwright.ssi.closed_forms import clip_to
     from patchwright.ssi.mesh_mesh import intersect_meshes
     from patchwright.ssi.mesh_surface import intersect_mesh_surface
 
@@ -100,11 +97,9 @@ def _pair(a: Operand, b: Operand, given: float | None) -> Intersection:
         return intersect_meshes(a.thing, b.thing)
     if isinstance(a.thing, Triangulation):
         assert isinstance(b.thing, Surface)
-        found = intersect_mesh_surface(a.thing, clip_to(b.thing, a.box), given)
-        return trimmed(found, b.thing, b.trims, 1)
+        return trimmed(intersect_mesh_surface(a.thing, b.thing, given), b.thing, b.trims, 1)
     if isinstance(b.thing, Triangulation):
-        found = intersect_mesh_surface(b.thing, clip_to(a.thing, b.box), given)
-        return trimmed(_swapped(found), a.thing, a.trims, 0)
+        return trimmed(_swapped(intersect_mesh_surface(b.thing, a.thing, given)), a.thing, a.trims, 0)
     found = _surfaces(a.thing, b.thing, _tolerance(a, b, given))
     return trimmed(trimmed(found, a.thing, a.trims, 0), b.thing, b.trims, 1)
 
@@ -120,23 +115,30 @@ def _surfaces(a: Surface, b: Surface, tolerance: float) -> Intersection:
     from patchwright.ssi.surface_surface import intersect_surfaces
 
     a, b = clip(a, b)
-    found = intersect_surfaces(a, b, tolerance)
+    return _joined(intersect_surfaces(a, b, tolerance), tolerance)
+
+
+def _joined(found: Intersection, tolerance: float) -> Intersection:
+    """The result with its curves joined across seams and poles."""
     extent = max((float(np.ptp(c.points, axis=0).max()) for c in found.curves), default=0.0)
     return chained(found, MEETING * extent + 10.0 * tolerance)
 
 
-def _self(item: Operand) -> Intersection:
-    """One surface or mesh with itself; of a free-form surface only a proof that it does not."""
+def _self(item: Operand, given: float | None) -> Intersection:
+    """One surface, face or mesh with itself."""
     from patchwright.ssi.mesh_mesh import intersect_meshes
+    from patchwright.ssi.recognised import itself_by_closed_form
+    from patchwright.ssi.self_surface import intersect_itself
 
     if isinstance(item.thing, Triangulation):
         return intersect_meshes(item.thing)
-    if isinstance(item.thing, ONCE) or (np.isfinite(item.size) and is_embedded(item.thing)):
+    tolerance = given or (SHARE * item.size if np.isfinite(item.size) else 1.0)
+    found = itself_by_closed_form(item.thing, tolerance)
+    if found is None and is_embedded(item.thing):
         return Intersection()
-    box = item.thing.domain
-    return Intersection(
-        unresolved=(Unresolved(box, box, "whether this one surface meets itself is neither proved nor searched"),)
-    )
+    if found is None:
+        found = _joined(intersect_itself(item.thing, tolerance), tolerance)
+    return trimmed(trimmed(found, item.thing, item.trims, 0), item.thing, item.trims, 1)
 
 
 def _numbered(found: Intersection, i: int, j: int) -> Intersection:

@@ -26,6 +26,7 @@ from patchwright.ssi.closed_forms.closed_form import KINDS, closed_form
 from patchwright.ssi.closed_forms.inversion import Analytic
 from patchwright.ssi.intersection import Contact, Intersection, IntersectionCurve
 from patchwright.ssi.recognise import Recognised, recognise
+from patchwright.ssi.self_closed_form import analytic_itself
 
 DEVIATION = 1e-2  # of the tolerance: what tells touching from crossing by the tolerance must not notice the difference
 SAMPLED = 3  # highest degree of a surface whose deviation on samples is trusted, see `_trusted`
@@ -70,6 +71,31 @@ def by_closed_form(a: Surface, b: Surface, tolerance: float) -> Intersection | N
         return _mapped(found, first, second)
     except _NotFitted:
         return None
+
+
+def itself_by_closed_form(surface: Surface, tolerance: float) -> Intersection | None:
+    """Everything a NURBS form of an analytic surface shares with itself; None for other surfaces."""
+    found = _analytic(surface, tolerance)
+    if not isinstance(found, Recognised):
+        return None if found is None else analytic_itself(found)
+    alone = analytic_itself(found.surface)
+    return Intersection(
+        points=tuple(_two_places(found.native, p, found.to_native(p.point[None])[0]) for p in alone.points)
+    )
+
+
+def _two_places(native: NurbsSurface, point: Contact, at: Array) -> Contact:
+    """The contact with its parameters at two places of the iso-curve that shrinks to it."""
+    speeds = [float(np.linalg.norm(native(at[0], at[1], nu))) for nu in ((1, 0), (0, 1))]
+    axis = int(speeds[1] < speeds[0])
+    low, high = native.domain[axis]
+    places = []
+    for t in (low, 0.5 * (low + high)):
+        uv = at.copy()
+        uv[axis] = t
+        places.append((float(uv[0]), float(uv[1])))
+    gap = float(np.linalg.norm(native(*places[0]) - native(*places[1])))
+    return replace(point, uv_a=places[0], uv_b=places[1], gap=gap)
 
 
 class _NotFitted(Exception):

@@ -41,7 +41,7 @@ def balls_of(rows: Array, tol: float, pieces: tuple[BezierPieces, BezierPieces])
     plain: list[Ball] = []
     for code, kind in ((BRANCH, "branch"), (TOUCH, "touch")):
         found = rows[codes == code]
-        for group in _groups(found[:, 15:18], max(MERGE, 4.0 * tol)):
+        for group in grouped(found[:, 15:18], max(MERGE, 4.0 * tol)):
             part = found[group]
             centre = part[:, 15:18].mean(axis=0)
             if out and min(np.linalg.norm(ball.centre - centre) for ball in out) <= 2.0 * MERGE:
@@ -59,7 +59,7 @@ def balls_of(rows: Array, tol: float, pieces: tuple[BezierPieces, BezierPieces])
 
         left = left[cKDTree(tangent).query(left[:, 15:18])[0] > 4.0 * left[:, 18] + 1e-4]
     if left.size:
-        for group in _groups(left[:, 15:18], 4.0 * float(np.median(left[:, 18])) + 16.0 * tol):
+        for group in grouped(left[:, 15:18], 4.0 * float(np.median(left[:, 18])) + 16.0 * tol):
             part = left[group]
             centre = part[:, 15:18].mean(axis=0)
             radius = float((np.linalg.norm(part[:, 15:18] - centre, axis=1) + part[:, 18]).max()) * 2.0
@@ -117,7 +117,7 @@ def _pole(rows: Array, pieces: tuple[BezierPieces, BezierPieces]) -> tuple[bool,
     return False, rows[0, 15:18]
 
 
-def _groups(points: Array, reach: float) -> list[IntArray]:
+def grouped(points: Array, reach: float) -> list[IntArray]:
     """Indices of points that hang together within a reach."""
     if not points.shape[0]:
         return []

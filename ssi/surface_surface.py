@@ -5,7 +5,9 @@ explains or hands back every pair of boxes: completeness comes from there alone.
 found to the borders of the pieces (`_tracing_kernel`) and joined across them; branch points, poles and tangent points
 end them. Branches are split at branch points, at poles and where they cross the seam of a closed surface.
 
-Limits. Coincident regions are handed back as unresolved boxes, not yet as overlaps with boundary curves. Crossing
+Surfaces that coincide in part go another way (`coincident_surfaces`).
+
+Limits. Coincident regions whose parameters do not correspond affinely are handed back as unresolved boxes. Crossing
 angles below about 1e-5 rad of curved surfaces, and tangent curves into the apex of a cone, can spend the budget or
 fail to be followed; both are handed back. Tangency is decided by samples within the tolerance along a valley whose
 convexity across is certified.
@@ -25,13 +27,14 @@ from patchwright.ssi.bezier_pieces import BezierPieces, Frame, widening
 from patchwright.ssi.fit import fitted
 from patchwright.ssi.following import Ground, crossing_arcs, touching_arcs
 from patchwright.ssi.intersection import Box, Contact, Intersection, Unresolved
+from patchwright.ssi.pair_findings import BUDGET, SMALL
 from patchwright.ssi.singular_points import Ball, balls_of
+from patchwright.ssi.two_orders import both_ways, one_of_each, swapped
 
 if TYPE_CHECKING:
     from patchwright.models.nurbs_surface import NurbsSurface
 
-BUDGET = 300_000  # pairs of boxes judged; 10 to 20 microseconds each
-SMALL = 1e-8  # of the size: boxes are not split below
+FIRST = 20_000  # pairs of boxes judged before it is asked whether the surfaces coincide
 WORST = 1e-6  # of the size: a curve that is further off is not returned but reported
 WILD = 1e6  # sizes: a longer arc is a step that went astray near a singular point
 
@@ -48,7 +51,8 @@ def intersect_surfaces(a: Surface, b: Surface, tolerance: float) -> Intersection
     ------
     ParameterError : a tolerance that is not positive.
     """
-    from patchwright.ssi._subdivision_kernel import subdivide
+    from patchwright.ssi._subdivision_kernel import OVERLAP, subdivide
+    from patchwright.ssi.coincident_surfaces import intersect_coincident
 
     if not tolerance > 0.0:
         raise ParameterError(f"the tolerance must be positive, got {tolerance}")
@@ -58,8 +62,42 @@ def intersect_surfaces(a: Surface, b: Surface, tolerance: float) -> Intersection
     tol = max(tolerance / frame.size, 2e-14)
     matrices = [widening(d) for s in surfaces for d in s.degree]
     rational = pieces[0].rational or pieces[1].rational
-    rows, counts = subdivide(pieces[0].nets, pieces[1].nets, *matrices, rational, tol, max(SMALL, 4.0 * tol), BUDGET)
+    nets, small = (pieces[0].nets, pieces[1].nets), max(SMALL, 4.0 * tol)
+    rows, counts = subdivide(*nets, *matrices, rational, tol, small, FIRST)
+    left = int(counts[3])
+    if (left or (rows[:, 0] == OVERLAP).any()) and surfaces == (a, b):
+        coincident = intersect_coincident(*surfaces, _shared(rows, pieces), frame, tol)
+        if coincident is not None:
+            return coincident
+    if left:
+        rows, counts = subdivide(*nets, *matrices, rational, tol, small, BUDGET)
     return _Work(a, b, surfaces, pieces, frame, tol, rows, int(counts[3])).result()
+
+
+def _shared(rows: Array, pieces: tuple[BezierPieces, BezierPieces]) -> Array:
+    """(k, 4) parameters of the points at which subdivision found the surfaces to coincide."""
+    from patchwright.ssi._subdivision_kernel import OVERLAP
+
+    found = rows[rows[:, 0] == OVERLAP]
+    sides = [pieces[s].parameters(found[:, 1 + s].astype(np.int64), found[:, 11 + 2 * s : 13 + 2 * s]) for s in (0, 1)]
+    return np.concatenate(sides, axis=1)
+
+
+def assembled(
+    surfaces: tuple[Surface, Surface],
+    nurbs: tuple[NurbsSurface, NurbsSurface],
+    pieces: tuple[BezierPieces, BezierPieces],
+    frame: Frame,
+    tol: float,
+    findings: tuple[Array, int],
+    *,
+    alone: bool = False,
+) -> Intersection:
+    """Curves and contacts from the findings (k, ROW) of subdivision on pieces, and the number of pairs left over.
+
+    `alone`: both surfaces are one; a finding then stands for both orders of its two places.
+    """
+    return _Work(*surfaces, nurbs, pieces, frame, tol, *findings, alone=alone).result()
 
 
 class _Work:
@@ -75,9 +113,11 @@ class _Work:
         tol: float,
         rows: Array,
         left: int,
+        *,
+        alone: bool = False,
     ) -> None:
         self.a, self.b, self.nurbs, self.pieces, self.frame, self.tol = a, b, nurbs, pieces, frame, tol
-        self.rows, self.left = rows, left
+        self.rows, self.left, self.alone = rows, left, alone
         self.codes: IntArray = rows[:, 0].astype(np.int64)
         self.ground = Ground(a, b, pieces, frame, tol)
         self.unresolved: list[Unresolved] = []
@@ -87,10 +127,14 @@ class _Work:
         from patchwright.ssi._subdivision_kernel import OVERLAP, TANGENT, TRANSVERSAL
 
         balls, plain = balls_of(self.rows, self.tol, self.pieces)
+        if self.alone:
+            balls = [both_ways(ball) for ball in balls]
         branches: list[Arc] = []
         for code, follow in ((TRANSVERSAL, crossing_arcs), (TANGENT, touching_arcs)):
-            arcs, stuck = follow(self.rows[self.codes == code], balls, self.ground)
-            branches += joined(arcs, self.ground.scale)
+            seeds = self.rows[self.codes == code]
+            arcs, stuck = follow(np.concatenate((seeds, swapped(seeds))) if self.alone else seeds, balls, self.ground)
+            found = joined(arcs, self.ground.scale)
+            branches += one_of_each(found, self.ground.scale) if self.alone else found
             for at, which in stuck:
                 self._stuck(at, which)
         self._check_ends(branches)

@@ -209,7 +209,6 @@ NOT_YET = {
     ("a10 tori side by side", "given"): SPENT,  # tangent contact where four branches meet
     ("a10 tori side by side", "nurbs"): SPENT,
     ("n09 angle 6e-07", "given"): SPENT,
-    ("n10 own sub-patch", "given"): "the surfaces coincide",  # free-form overlaps are not grown into regions
 }
 
 

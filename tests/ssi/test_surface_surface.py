@@ -236,12 +236,12 @@ def test_apart_is_empty_and_proved() -> None:
     assert not found.points
 
 
-def test_what_is_not_explained_is_handed_back() -> None:
-    """Coincident surfaces are not yet resolved into regions: they must not look empty."""
+def test_coincident_surfaces_are_an_overlap() -> None:
     s = graph(lambda x, y: 0.3 * x * y + 0.2 * x**3)
     found = intersect_surfaces(s, s.restricted((0.2, 0.7), (0.3, 0.6)), 1e-10)
-    assert not found.complete
-    assert any("coincide" in u.reason for u in found.unresolved)
+    assert found.complete
+    (region,) = found.overlaps
+    assert len(region.boundary) == 4
 
 
 def test_a_tolerance_must_be_positive() -> None:
