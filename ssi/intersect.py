@@ -90,6 +90,7 @@ def _tolerance(a: Operand, b: Operand, given: float | None) -> float:
 
 def _pair(a: Operand, b: Operand, given: float | None) -> Intersection:
     """One pair by the method for its kinds, cut back to the trims."""
+    from patchwright.ssi.closed_forms import clip_to
     from patchwright.ssi.mesh_mesh import intersect_meshes
     from patchwright.ssi.mesh_surface import intersect_mesh_surface
 
@@ -97,9 +98,11 @@ def _pair(a: Operand, b: Operand, given: float | None) -> Intersection:
         return intersect_meshes(a.thing, b.thing)
     if isinstance(a.thing, Triangulation):
         assert isinstance(b.thing, Surface)
-        return trimmed(intersect_mesh_surface(a.thing, b.thing, given), b.thing, b.trims, 1)
+        found = intersect_mesh_surface(a.thing, clip_to(b.thing, a.box), given)
+        return trimmed(found, b.thing, b.trims, 1)
     if isinstance(b.thing, Triangulation):
-        return trimmed(_swapped(intersect_mesh_surface(b.thing, a.thing, given)), a.thing, a.trims, 0)
+        found = intersect_mesh_surface(b.thing, clip_to(a.thing, b.box), given)
+        return trimmed(_swapped(found), a.thing, a.trims, 0)
     found = _surfaces(a.thing, b.thing, _tolerance(a, b, given))
     return trimmed(trimmed(found, a.thing, a.trims, 0), b.thing, b.trims, 1)
 
