@@ -140,6 +140,24 @@ def side_normals(layout: QuadLayout, nets: PatchNets, count: int = FIELD_SAMPLES
     return out
 
 
+def edge_uses(layout: QuadLayout) -> IntArray:
+    """(e, 2) the first and the last side 4 q + k that runs along each edge; equal on a boundary."""
+    sides = layout.quad_edges.reshape(-1)
+    order = np.argsort(sides, kind="stable")
+    numbers = np.arange(len(layout.edges))
+    return np.stack(
+        [order[np.searchsorted(sides[order], numbers)], order[np.searchsorted(sides[order], numbers, "right") - 1]],
+        axis=1,
+    )
+
+
+def seam_angles(layout: QuadLayout, sides: Array) -> Array:
+    """(e,) degrees, the largest angle between the normals of both patches along each edge (`side_normals`)."""
+    one, two = sides.reshape(-1, *sides.shape[2:])[edge_uses(layout)].swapaxes(0, 1)
+    half = np.clip(np.linalg.norm(one - two, axis=2) / 2.0, 0.0, 1.0)
+    return np.asarray(np.degrees(2.0 * np.arcsin(half)).max(axis=1))
+
+
 def edge_fields(layout: QuadLayout, sides: Array, sectors: Array) -> Array:
     """(e, FIELD_SAMPLES, 3) the common unit normal along every edge, in the edge's direction.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from patchwright.models.arrays import Array
-from patchwright.repair.joins import side_normals
+from patchwright.repair.joins import edge_uses, seam_angles, side_normals
 from patchwright.repair.network import PatchNetwork
 from patchwright.repair.patch_nets import evaluate
 from patchwright.repair.result import Seam
@@ -17,24 +17,21 @@ SAMPLES = 25
 def measure(network: PatchNetwork) -> tuple[Seam, ...]:
     """One `Seam` per edge: gap and normal angle between its two patches at `SAMPLES` equal parameters."""
     layout = network.layout
-    points, normals = _side_points(network), side_normals(layout, network.nets, SAMPLES)
-    uses: list[list[tuple[int, int]]] = [[] for _ in range(len(layout.edges))]
-    for (quad, side), edge in np.ndenumerate(layout.quad_edges):
-        uses[int(edge)].append((quad, side))
+    angle = seam_angles(layout, side_normals(layout, network.nets, SAMPLES))
+    uses = edge_uses(layout)
+    points = _side_points(network).reshape(-1, SAMPLES, 3)[uses]
+    gap = np.linalg.norm(points[:, 0] - points[:, 1], axis=2).max(axis=1)
     along = network.edges.sample(SAMPLES)
     length = np.linalg.norm(np.diff(along, axis=1), axis=2).sum(axis=1)
     middle = along[:, SAMPLES // 2]
-    pair = np.array([(u[0][0], u[0][1], u[-1][0], u[-1][1]) for u in uses])
-    gap = np.linalg.norm(points[pair[:, 0], pair[:, 1]] - points[pair[:, 2], pair[:, 3]], axis=2).max(axis=1)
-    n1, n2 = normals[pair[:, 0], pair[:, 1]], normals[pair[:, 2], pair[:, 3]]
-    angle = np.degrees(2.0 * np.arcsin(np.clip(np.linalg.norm(n1 - n2, axis=2) / 2.0, 0.0, 1.0))).max(axis=1)
     seams = []
-    for number, use in enumerate(uses):
-        kind = "free" if len(use) < 2 else ("sharp" if layout.sharp[number] else "smooth")
+    for number, (first, last) in enumerate((uses // 4).tolist()):
+        free = layout.boundary[number]
+        kind = "free" if free else ("sharp" if layout.sharp[number] else "smooth")
         x, y, z = middle[number].tolist()
         seams.append(
             Seam(
-                tuple(q for q, _ in use),
+                (first,) if free else (first, last),
                 float(gap[number]),
                 float(angle[number]),
                 kind,

@@ -10,7 +10,7 @@ import numpy as np
 from patchwright.models.arrays import Array, IntArray, frozen
 from patchwright.repair.edge_curves import EdgeCurves
 from patchwright.repair.quad_layout import QuadLayout
-from patchwright.repair.spline_space import greville, uniform_collocation
+from patchwright.repair.spline_space import greville, refinement, uniform_collocation
 
 FOLD_SAMPLES = 13
 
@@ -54,6 +54,15 @@ class PatchNets:
         m, n = self.cells[which[0]] + 3
         rows = self.offsets[which][:, None] + np.arange(m * n)
         return self.controls[rows].reshape(len(which), m, n, 3)
+
+    def refined(self, cells: IntArray) -> PatchNets:
+        """The same surfaces in finer spaces: `cells` (m, 2) are whole multiples of the present ones."""
+        sizes = np.concatenate([self.cells, cells], axis=1)
+        groups = []
+        for m, n, fine_m, fine_n in np.unique(sizes, axis=0).tolist():
+            which = np.flatnonzero((sizes == (m, n, fine_m, fine_n)).all(axis=1))
+            groups.append((which, evaluate(self.nets(which), refinement(m, fine_m), refinement(n, fine_n))))
+        return PatchNets.pack(cells, groups)
 
     def sample(self, count: int, derivative: tuple[int, int] = (0, 0)) -> Array:
         """(m, count, count, 3) a derivative of every patch at count x count equidistant parameters."""

@@ -20,6 +20,7 @@ from patchwright.repair.joins import (
     edge_end_normals,
     edge_fields,
     follow_fields,
+    seam_angles,
     sector_normals,
     side_normals,
     smooth_edges,
@@ -34,6 +35,9 @@ from patchwright.repair.stars import corner_angles, leaving, spread
 FIRST_CELLS = 2
 MOST_CELLS = 16
 JOIN_PASSES = 3  # the field settles where both sides can follow; on aircraft the p90 angle goes 10.7, 2.2, 1.6, 1.3
+JOIN_REFINEMENTS = 2  # times the pieces along a seam are doubled for the sake of smoothness
+SMOOTH = 0.5  # degrees: seams that turn by no more are smooth enough
+MOST_JOINED = 32  # pieces along a seam
 WORTH = 0.8  # twice the pieces must bring the error below this share of what it was, or they count as barren
 PATIENCE = 2  # barren doublings in a row after which a curve or patch is left as it is
 
@@ -119,18 +123,54 @@ def resurface(
         barren_patches[redo] = np.where(state.error > WORTH * before, barren_patches + 1, 0)[redo]
     state = _unfolded(layout, state, target, tolerance)
     say("joining patches", 0.95)
-    nets, error = state.nets, state.error
-    for turn in range(JOIN_PASSES):
+    allowed = np.maximum(2.0 * state.error, tolerance.fit)  # position before smoothness
+    joined = _joined(layout, state.nets, state.error, sectors, target, allowed, state.invented)
+    for _ in range(JOIN_REFINEMENTS):
+        cells = _smoother_cells(layout, joined[0], tolerance)
+        if (cells == joined[0].cells).all():
+            break
+        joined = _joined(layout, joined[0].refined(cells), joined[1], sectors, target, allowed, state.invented)
+    return PatchNetwork(layout, edges, joined[0], state.invented, joined[1])
+
+
+def _joined(
+    layout: QuadLayout,
+    nets: PatchNets,
+    error: Array,
+    sectors: Array,
+    target: Target,
+    allowed: Array,
+    invented: BoolArray,
+) -> tuple[PatchNets, Array]:
+    """The nets with smooth seams, and the error of each patch.
+
+    A join that takes a patch farther from its data than `allowed` (m,) is undone for that patch.
+    """
+    everything = np.arange(len(layout.quads))
+    for _ in range(JOIN_PASSES):
         moved = follow_fields(layout, nets, edge_fields(layout, side_normals(layout, nets), sectors))
-        found = _patch_errors(layout, moved, everything, target, state.invented)
-        # a join that spoils a patch is undone for that patch: position before smoothness
-        allowed = np.maximum(error if turn else 2.0 * error, tolerance.fit)
+        found = _patch_errors(layout, moved, everything, target, invented)
         spoiled = np.flatnonzero(found > allowed)
         if len(spoiled):
             moved = _merge(moved, nets, spoiled)
             found[spoiled] = error[spoiled]
         nets, error = moved, found
-    return PatchNetwork(layout, edges, nets, state.invented, error)
+    return nets, error
+
+
+def _smoother_cells(layout: QuadLayout, nets: PatchNets, tolerance: Tolerance) -> IntArray:
+    """(m, 2) cells of each patch, doubled along its smooth seams that still turn by more than `SMOOTH`.
+
+    Seams that turn like creases are left: no number of pieces makes a fold smooth.
+    """
+    turned = seam_angles(layout, side_normals(layout, nets))
+    rough = smooth_edges(layout) & (turned > SMOOTH) & (turned < tolerance.angle)
+    cells = np.array(nets.cells)
+    for k in range(4):
+        which = rough[layout.quad_edges[:, k]] & (cells[:, k % 2] == nets.cells[:, k % 2])
+        cells[which, k % 2] *= 2
+    cells[cells > MOST_JOINED] = np.asarray(nets.cells)[cells > MOST_JOINED]
+    return cells
 
 
 def _fit_edge_curves(layout: QuadLayout, target: Target, cells: IntArray) -> EdgeCurves:

@@ -50,3 +50,13 @@ def test_a_sheet_that_turns_back_is_a_fold_and_the_way_of_its_parameters_does_no
     across = net_of(lambda u, v: np.stack([v * (1.5 - v), u, 0.0 * u], axis=-1))
     assert folds(folded)[0] > 0.0
     assert folds(across)[0] == folds(folded)[0]
+
+
+def test_refined_nets_are_the_same_surfaces():
+    rng = np.random.default_rng(3)
+    cells = np.array([[2, 2], [4, 2], [2, 4]])
+    groups = [(np.array([i]), rng.normal(size=(1, m + 3, n + 3, 3))) for i, (m, n) in enumerate(cells)]
+    nets = PatchNets.pack(cells, groups)
+    finer = nets.refined(cells * [[2, 1], [1, 1], [2, 4]])
+    assert finer.cells.tolist() == [[4, 2], [4, 2], [4, 16]]
+    np.testing.assert_allclose(finer.sample(17), nets.sample(17), atol=1e-13)

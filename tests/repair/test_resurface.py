@@ -44,6 +44,13 @@ def test_neighbours_meet_exactly_and_smoothly():
     assert angles[0] > 4 * angles[1] > 8 * angles[2]
 
 
+@pytest.mark.parametrize("fit", [1e-2, 1e-4])
+def test_seams_turn_by_half_a_degree_at_most_at_irregular_vertices_too(fit):
+    network = network_of(2, fit)
+    assert max(s.angle for s in measure(network)) <= 0.5
+    assert true_error(network) <= 2.0 * fit
+
+
 def test_joins_stay_exact_where_neighbours_have_different_pieces():
     network = network_of(1, 1e-5, slit=0.2)
     assert max(s.gap for s in measure(network)) < 1e-13
