@@ -75,6 +75,8 @@ def mend(
     cure(work)
     tell("unite", 0.7)
     kept = unite_as_decided(work, openings)
+    tell("cure", 0.85)
+    cure(work)
     tell("verify", 0.9)
     _verify(work)
     result = _result(work, kept)

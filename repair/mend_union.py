@@ -45,9 +45,9 @@ def unite(work: Work, openings: str) -> tuple[Array, ...]:
     is_cap, body = is_cap[left], np.unique(body[left], return_inverse=True)[1].reshape(-1)
     is_cap, body = _untangle(work, is_cap, body)
     hull = outer_hull(work.now, body)
+    names = {b: work.names(known(work.source[body == b])) for b in {piece.inside for piece in hull.inside} - {-1}}
     for piece in hull.inside:
-        into = work.names(known(work.source[np.flatnonzero(body == piece.inside)])) if piece.inside >= 0 else ()
-        named = ", ".join(into) if into else "another body"
+        named = ", ".join(names.get(piece.inside, ())) or "another body"
         real = piece.triangles[~is_cap[piece.triangles]]
         work.drop("inner surface", f"it lies inside {named}", real, piece.area)
     for sentence in hull.failed:

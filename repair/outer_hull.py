@@ -19,6 +19,8 @@ from patchwright.models.triangulation import Triangulation
 from patchwright.repair.untangle import winding
 from patchwright.ssi.outer_hull import outer_pieces
 
+LOST = 1e-9  # of a triangle: what cutting it up may lose to round-off
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Inside:
@@ -60,17 +62,18 @@ def outer_hull(triangulation: Triangulation, body: IntArray, inward: BoolArray |
     bodies = int(body.max(initial=-1)) + 1
     inward = np.zeros(bodies, dtype=np.bool_) if inward is None else inward
     groups = _groups(triangulation, body, bodies)
+    own = _by_body(body, bodies)
     made: list[Pieces | None] = []
     failed: list[str] = []
     for group in groups:
         united = None
         if len(group) > 1:
             try:
-                united = _unite(triangulation, body, group, inward)
+                united = _unite(triangulation, own, group, inward)
             except _Refused as refusal:
                 failed.append(str(refusal))
         made.append(united)
-    return _joined(triangulation, body, groups, made, tuple(failed))
+    return _joined(triangulation, own, groups, made, tuple(failed))
 
 
 def untangled(triangulation: Triangulation, body: IntArray, tangled: IntArray) -> Hull:
@@ -81,17 +84,23 @@ def untangled(triangulation: Triangulation, body: IntArray, tangled: IntArray) -
     GeometryError : sheets so near each other that the cuts or the sides cannot be told.
     """
     groups = [np.array([b]) for b in range(int(body.max(initial=-1)) + 1)]
+    own = _by_body(body, len(groups))
     made: list[Pieces | None] = [None] * len(groups)
     for b in tangled.tolist():
-        own = np.flatnonzero(body == b)
-        hull, parent = outer_pieces(triangulation.take(own))
-        made[b] = hull.vertices, hull.triangles, own[parent]
-    return _joined(triangulation, body, groups, made, ())
+        hull, parent = outer_pieces(triangulation.take(own[b]))
+        made[b] = hull.vertices, hull.triangles, own[b][parent]
+    return _joined(triangulation, own, groups, made, ())
+
+
+def _by_body(body: IntArray, bodies: int) -> list[IntArray]:
+    """The triangles of each body."""
+    order = np.argsort(body, kind="stable")
+    return np.split(order, np.cumsum(np.bincount(body, minlength=bodies))[:-1]) if bodies else []
 
 
 def _joined(
     triangulation: Triangulation,
-    body: IntArray,
+    bodies: list[IntArray],
     groups: Sequence[IntArray],
     made: Sequence[Pieces | None],
     failed: tuple[str, ...],
@@ -105,7 +114,7 @@ def _joined(
     cuts: list[BoolArray] = []
     inside: list[Inside] = []
     for group, pieces in zip(groups, made, strict=True):
-        own = np.flatnonzero(np.isin(body, group))
+        own = np.sort(np.concatenate([bodies[b] for b in group]))
         if pieces is None:
             rows.append(triangulation.triangles[own])
             parents.append(own)
@@ -118,7 +127,7 @@ def _joined(
         rows.append(new_rows)
         parents.append(parent)
         cuts.append(cut)
-        inside += _dropped(triangulation, body, group, own, points, triangles, parent)
+        inside += _dropped(triangulation, bodies, group, own, points, triangles, parent)
     parent = np.concatenate(parents) if parents else np.zeros(0, dtype=np.int64)
     order = np.argsort(parent, kind="stable")
     parent = parent[order]
@@ -155,7 +164,7 @@ def _groups(triangulation: Triangulation, body: IntArray, bodies: int) -> list[I
     return [np.flatnonzero(label == k) for k in range(int(label.max()) + 1)]
 
 
-def _unite(triangulation: Triangulation, body: IntArray, group: IntArray, inward: BoolArray) -> Pieces:
+def _unite(triangulation: Triangulation, bodies: list[IntArray], group: IntArray, inward: BoolArray) -> Pieces:
     """The union of some bodies."""
     import manifold3d
 
@@ -163,7 +172,7 @@ def _unite(triangulation: Triangulation, body: IntArray, group: IntArray, inward
     cavities: list[Any] = []
     index: dict[int, IntArray] = {}
     for b in group:
-        own = np.flatnonzero(body == b)
+        own = bodies[b]
         used, local = np.unique(triangulation.triangles[own], return_inverse=True)
         local = local.reshape(-1, 3)
         number = int(manifold3d.Manifold.reserve_ids(1))
@@ -232,7 +241,7 @@ def _rejoin(
 
 def _dropped(
     triangulation: Triangulation,
-    body: IntArray,
+    bodies: list[IntArray],
     group: IntArray,
     own: IntArray,
     points: Array,
@@ -244,48 +253,53 @@ def _dropped(
     from scipy.sparse.csgraph import connected_components
 
     a, b, c = points[triangles[:, 0]], points[triangles[:, 1]], points[triangles[:, 2]]
-    left = np.bincount(parent, 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1), minlength=len(triangulation))
-    areas = triangulation.areas
-    lost = np.zeros(len(triangulation), dtype=np.bool_)
-    lost[own] = left[own] < areas[own] * (1.0 - 1e-9)
-    index = np.flatnonzero(lost)
+    at = np.searchsorted(own, parent)
+    left = np.bincount(at, 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1), minlength=len(own))
+    some = triangulation.take(own)
+    areas = some.areas
+    index = np.flatnonzero(areas - left > LOST * areas + np.finfo(float).eps * some.diagonal**2)
     if not len(index):
         return []
-    rows = triangulation.triangles[index]
-    used, local = np.unique(rows, return_inverse=True)
+    body = np.empty(len(own), dtype=np.int64)
+    local_of = {int(k): np.searchsorted(own, bodies[k]) for k in group}
+    for k, mine in local_of.items():
+        body[mine] = k
+    used, local = np.unique(some.triangles[index], return_inverse=True)
     local = local.reshape(-1, 3)
     graph = coo_array(
         (np.ones(2 * len(local)), (np.repeat(local[:, 0], 2), local[:, 1:].reshape(-1))), shape=(len(used), len(used))
     )
     _, label = connected_components(graph, directed=False)
     piece = label[local[:, 0]]
-    pieces = []
-    middle = triangulation.corners[index].mean(axis=1)
-    for k in np.unique(piece):
-        some = index[piece == k]
-        lost_area = areas[some] - left[some]
-        deep = some[np.argmax(lost_area / np.maximum(areas[some], np.finfo(float).tiny))]
-        where = np.average(middle[piece == k], axis=0, weights=np.maximum(lost_area, np.finfo(float).tiny))
-        pieces.append(
-            Inside(
-                int(body[deep]),
-                _container(triangulation, body, group, deep),
-                some,
-                float(lost_area.sum()),
-                where,
-            )
-        )
-    return pieces
+    lost = areas[index] - left[index]
+    corners = some.corners
+    middle = corners[index].mean(axis=1)
+    weight = np.maximum(lost, np.finfo(float).tiny)
+    area = np.bincount(piece, lost)
+    where = np.stack([np.bincount(piece, weight * middle[:, k]) for k in range(3)], axis=1)
+    where /= np.bincount(piece, weight)[:, None]
+    # the triangle that lost most of itself tells which body the piece is of and where it lies
+    order = np.lexsort((-lost / np.maximum(areas[index], np.finfo(float).tiny), piece))
+    deep = order[np.searchsorted(piece[order], np.arange(len(area)))]
+    around = _containers(corners, local_of, middle[deep], body[index[deep]])
+    members = np.split(own[index[np.argsort(piece, kind="stable")]], np.cumsum(np.bincount(piece))[:-1])
+    return [
+        Inside(int(body[index[deep[k]]]), int(around[k]), members[k], float(area[k]), where[k])
+        for k in range(len(area))
+    ]
 
 
-def _container(triangulation: Triangulation, body: IntArray, group: IntArray, triangle: int) -> int:
-    """The other body whose winding number around the triangle's centre is largest, -1 when none is near 1."""
-    point = triangulation.corners[triangle].mean(axis=0)
-    best, found = 0.5, -1
-    for b in group:
-        if b == body[triangle]:
-            continue
-        around = winding(triangulation.corners[body == b], point)
-        if around > best:
-            best, found = around, int(b)
+def _containers(corners: Array, bodies: dict[int, IntArray], points: Array, own: IntArray) -> IntArray:
+    """(k,) the body with the largest winding number round each point, its own aside; -1 when none is near 1.
+
+    `bodies` are the triangles of each; only bodies whose boxes hold the point are asked.
+    """
+    best, found = np.full(len(points), 0.5), np.full(len(points), -1, dtype=np.int64)
+    for b, triangles in bodies.items():
+        mine = corners[triangles]
+        low, high = mine.min(axis=(0, 1)), mine.max(axis=(0, 1))
+        for k in np.flatnonzero(((points >= low) & (points <= high)).all(axis=1) & (own != b)):
+            around = winding(mine, points[k])
+            if around > best[k]:
+                best[k], found[k] = around, b
     return found
