@@ -25,6 +25,9 @@ def orientation(exam: Examination) -> Finding:
     whole = turned == total
     cavity = _cavities(exam, whole)
     zones = _zones(exam)
+    outer = _outer(exam, parts)
+    # what bounds the fluid from outside may face either way: its fewer triangles are those that run against the others
+    flipped = flipped ^ (outer & ~whole & (turned > 0.5 * total))[component]
     mixed = flipped & ~whole[component]
     index = np.flatnonzero(mixed)
 
@@ -35,7 +38,6 @@ def orientation(exam: Examination) -> Finding:
         exam, "flipped", "error", exam.body.triangles[index], exam.body.corners[index], exam.body_index[index], say,
         labels=np.unique(zones[index], return_inverse=True)[1].astype(np.int64),
     )  # fmt: skip
-    outer = _outer(exam, parts)
     inward = whole & ~cavity & _closed(exam, parts)
     defects += _bodies(exam, inward & ~outer, "error", "faces inward: the body is inside out")
     defects += _bodies(exam, inward & outer, "info", "faces inward round the model: the fluid's outer bound")
