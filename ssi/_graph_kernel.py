@@ -10,7 +10,9 @@ from __future__ import annotations
 
 import math
 
-from patchwright.models._compile_kernel import inner
+import numpy as np
+
+from patchwright.models._compile_kernel import inner, kernel
 from patchwright.models.arrays import Array
 from patchwright.ssi._jet_kernel import dot, jets
 from patchwright.ssi.bezier_pieces import MARGIN
@@ -133,10 +135,13 @@ def derivative_bounds(R: Array, rational: bool, D: Array, S: Array) -> bool:
 
 
 @inner
-def graph_bounds(R: Array, rational: bool, D: Array, S: Array, G: Array, K: Array, H: Array) -> bool:
+def graph_bounds(
+    R: Array, rational: bool, D: Array, S: Array, G: Array, K: Array, E: Array, H: Array
+) -> bool:  # fmt: skip
     """H[0..2] = intervals of z_xx, z_xy, z_yy over the box of the rotated net R; False where it is no graph.
 
-    K = 2 x 2 inverse of the mid Jacobian of (x, y), which the parameters are first straightened with.
+    K = 2 x 2 inverse of the mid Jacobian of (x, y), which the parameters are first straightened with; E = intervals of
+    z_x, z_y and of the derivatives a_x, a_y, b_x, b_y of the straightened parameters.
     """
     if not derivative_bounds(R, rational, D, S):
         return False
@@ -189,6 +194,9 @@ def graph_bounds(R: Array, rational: bool, D: Array, S: Array, G: Array, K: Arra
     ay0, ay1 = times(-G[1, 0, 1], -G[1, 0, 0], r0, r1)
     bx0, bx1 = times(-G[0, 1, 1], -G[0, 1, 0], r0, r1)
     by0, by1 = times(G[0, 0, 0], G[0, 0, 1], r0, r1)
+    E[0, 0], E[0, 1], E[1, 0], E[1, 1] = zx0, zx1, zy0, zy1
+    E[2, 0], E[2, 1], E[3, 0], E[3, 1] = ax0, ax1, ay0, ay1
+    E[4, 0], E[4, 1], E[5, 0], E[5, 1] = bx0, bx1, by0, by1
     for k in range(3):  # P^T W P
         f0, f1, g0, g1 = (ax0, ax1, bx0, bx1) if k < 2 else (ay0, ay1, by0, by1)
         s0, s1, t0, t1 = (ax0, ax1, bx0, bx1) if k == 0 else (ay0, ay1, by0, by1)
@@ -204,6 +212,138 @@ def graph_bounds(R: Array, rational: bool, D: Array, S: Array, G: Array, K: Arra
         H[k, 0] = lo + p0
         H[k, 1] = hi + p1
     return True
+
+
+@inner
+def third_derivative_bounds(R: Array, rational: bool, D: Array, S: Array) -> None:
+    """D[5..8, c] = intervals of the derivatives uuu, uuv, uvv, vvv; D[0..4] and S are those of the lower ones."""
+    P = R.shape[0]
+    Q = R.shape[1]
+    p = float(P - 1)
+    q = float(Q - 1)
+    width = 4 if rational else 3
+    for c in range(width):
+        for k in range(4):
+            m = 3 - k
+            D[5 + k, c, 0] = D[5 + k, c, 1] = 0.0
+            if m >= P or k >= Q:
+                continue
+            lo = math.inf
+            hi = -math.inf
+            for i in range(P - m):
+                for j in range(Q - k):
+                    if k == 0:
+                        x = R[i + 3, j, c] - R[i, j, c] - 3.0 * (R[i + 2, j, c] - R[i + 1, j, c])
+                    elif k == 1:
+                        x = R[i + 2, j + 1, c] - 2.0 * R[i + 1, j + 1, c] + R[i, j + 1, c]
+                        x -= R[i + 2, j, c] - 2.0 * R[i + 1, j, c] + R[i, j, c]
+                    elif k == 2:
+                        x = R[i + 1, j + 2, c] - 2.0 * R[i + 1, j + 1, c] + R[i + 1, j, c]
+                        x -= R[i, j + 2, c] - 2.0 * R[i, j + 1, c] + R[i, j, c]
+                    else:
+                        x = R[i, j + 3, c] - R[i, j, c] - 3.0 * (R[i, j + 2, c] - R[i, j + 1, c])
+                    lo = min(lo, x)
+                    hi = max(hi, x)
+            f = 1.0
+            for i in range(m):
+                f *= p - i
+            for i in range(k):
+                f *= q - i
+            D[5 + k, c, 0] = f * lo
+            D[5 + k, c, 1] = f * hi
+    if not rational:
+        return
+    w0 = math.inf
+    w1 = -math.inf
+    for i in range(P):
+        for j in range(Q):
+            w0 = min(w0, R[i, j, 3])
+            w1 = max(w1, R[i, j, 3])
+    for c in range(3):
+        for k in range(
+            4
+        ):  # S_fgh = (X_fgh - S_fg w_h - S_fh w_g - S_gh w_f - S_f w_gh - S_g w_fh - S_h w_fg - S w_fgh) / w
+            f = 1 if k > 2 else 0
+            g = 1 if k > 1 else 0
+            h = 1 if k > 0 else 0
+            a0, a1 = times(S[c, 0], S[c, 1], D[5 + k, 3, 0], D[5 + k, 3, 1])
+            lo = D[5 + k, c, 0] - a1
+            hi = D[5 + k, c, 1] - a0
+            for i in range(3):
+                one = (f, g, h)[i]
+                two = 2 + f + g + h - one
+                a0, a1 = times(D[two, c, 0], D[two, c, 1], D[one, 3, 0], D[one, 3, 1])
+                b0, b1 = times(D[one, c, 0], D[one, c, 1], D[two, 3, 0], D[two, 3, 1])
+                lo -= a1 + b1
+                hi -= a0 + b0
+            D[5 + k, c, 0], D[5 + k, c, 1] = times(lo, hi, 1.0 / w1, 1.0 / w0)
+
+
+@inner
+def third_graph_bounds(
+    R: Array, rational: bool, D: Array, S: Array, G: Array, K: Array, E: Array, H: Array, T: Array
+) -> None:
+    """T[0..3] = intervals of z_xxx, z_xxy, z_xyy, z_yyy; the rest as `graph_bounds` left it.
+
+    Over straightened parameters: z_fgh = Z_ijk x^i_f x^j_g x^k_h + Z_ij (x^i_fg x^j_h + ...) + Z_i x^i_fgh.
+    """
+    third_derivative_bounds(R, rational, D, S)
+    for c in range(3):
+        for k in range(4):
+            f = 1 if k > 2 else 0
+            g = 1 if k > 1 else 0
+            h = 1 if k > 0 else 0
+            lo = 0.0
+            hi = 0.0
+            for i in range(8):
+                a = i & 1
+                b = (i >> 1) & 1
+                d = i >> 2
+                m = 5 + a + b + d
+                x0, x1 = scaled(K[a, f] * K[b, g] * K[d, h], D[m, c])
+                lo += x0
+                hi += x1
+            G[5 + k, c, 0] = lo
+            G[5 + k, c, 1] = hi
+    for k in range(4):  # W_fgh = Z_ijk x^i_f x^j_g x^k_h, kept in G[5 + k, 2]
+        f = 1 if k > 2 else 0
+        g = 1 if k > 1 else 0
+        h = 1 if k > 0 else 0
+        lo = G[5 + k, 2, 0]
+        hi = G[5 + k, 2, 1]
+        for c in range(2):
+            a0, a1 = times(E[c, 0], E[c, 1], G[5 + k, c, 0], G[5 + k, c, 1])
+            lo -= a1
+            hi -= a0
+        for i in range(3):
+            one = (f, g, h)[i]
+            two = 2 + f + g + h - one
+            for c in range(2):
+                for d in range(2):
+                    a0, a1 = times(G[two, c, 0], G[two, c, 1], G[one, d, 0], G[one, d, 1])
+                    a0, a1 = times(a0, a1, H[c + d, 0], H[c + d, 1])
+                    lo -= a1
+                    hi -= a0
+        G[5 + k, 2, 0] = lo
+        G[5 + k, 2, 1] = hi
+    for k in range(4):
+        lo = 0.0
+        hi = 0.0
+        for i in range(8):
+            a = i & 1
+            b = (i >> 1) & 1
+            d = i >> 2
+            m = 5 + a + b + d
+            one = 2 + 2 * a + (1 if k > 2 else 0)
+            two = 2 + 2 * b + (1 if k > 1 else 0)
+            three = 2 + 2 * d + (1 if k > 0 else 0)
+            x0, x1 = times(E[one, 0], E[one, 1], E[two, 0], E[two, 1])
+            x0, x1 = times(x0, x1, E[three, 0], E[three, 1])
+            x0, x1 = times(x0, x1, G[m, 2, 0], G[m, 2, 1])
+            lo += x0
+            hi += x1
+        T[k, 0] = lo
+        T[k, 1] = hi
 
 
 @inner
@@ -281,6 +421,23 @@ def difference(
     for k in range(6):
         f[k] = ga[k] - gb[k]
     return True
+
+
+@kernel
+def differences(A: Array, B: Array, w: Array, F: Array, c: Array, xy: Array) -> Array:
+    """(k, 10) f, f_x, f_y, f_xx, f_xy, f_yy and the parameters u, v, s, t at places (k, 2) of the frame F at c, found
+    from w; NaN where a foot is missing."""
+    most = max(max(A.shape[0], A.shape[1]), max(B.shape[0], B.shape[1])) + 1
+    bu, bv, h, ja, jb = np.empty((3, most)), np.empty((3, most)), np.empty((6, 4)), np.empty((6, 3)), np.empty((6, 3))
+    ga, gb, f, p = np.empty(6), np.empty(6), np.empty(6), np.empty(4)
+    everywhere = np.array([-1.0, 2.0, -1.0, 2.0])
+    out = np.full((xy.shape[0], 10), math.nan)
+    for k in range(xy.shape[0]):
+        p[:] = w
+        if difference(A, B, p, xy[k, 0], xy[k, 1], F, c, everywhere, everywhere, bu, bv, h, ja, jb, ga, gb, f):
+            out[k, :6] = f
+            out[k, 6:] = p
+    return out
 
 
 @inner

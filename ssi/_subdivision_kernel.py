@@ -15,7 +15,14 @@ import numpy as np
 
 from patchwright.models._compile_kernel import inner, kernel, making
 from patchwright.models.arrays import Array, IntArray
-from patchwright.ssi._graph_kernel import difference, functional_range, graph_bounds, height_range, rotated
+from patchwright.ssi._graph_kernel import (
+    difference,
+    functional_range,
+    graph_bounds,
+    height_range,
+    rotated,
+    third_graph_bounds,
+)
 from patchwright.ssi._jet_kernel import FRAME, cross, dot, jets, slice_newton, unit
 
 SPLIT, EXCLUDED, TRANSVERSAL, TOUCH, BRANCH, TANGENT, OVERLAP, SINGULAR, BUDGET = range(9)
@@ -173,7 +180,10 @@ def judge(
     rational: bool, tol: float, small: float, found: Array, work: tuple[Array, ...], info: Array,
 ) -> tuple[int, int]:  # fmt: skip
     """The code of a pair and the number of points put into `found` (k, 8): u v s t x y z gap."""
-    (F, c, w, p, f, RA, RB, EA, EB, D, S, G, KA, KB, HA, HB, bu, bv, h, ja, jb, ga, gb, frame, _) = work
+    (
+        F, c, w, p, f, RA, RB, WA, WB, DA, DB, SA, SB, GA, GB, KA, KB, EA, EB, HA, HB, TA, TB,
+        bu, bv, h, ja, jb, ga, gb, frame, _,
+    ) = work  # fmt: skip
     info[0] = 0.0
     info[1] = 0.0
     info[5] = 0.0
@@ -226,9 +236,11 @@ def judge(
     y1 = min(a1, b1)
     if big:
         return SINGULAR, 0
-    rotated(wide_a, F, c, EA)
-    rotated(wide_b, F, c, EB)
-    if not (graph_bounds(EA, rational, D, S, G, KA, HA) and graph_bounds(EB, rational, D, S, G, KB, HB)):
+    rotated(wide_a, F, c, WA)
+    rotated(wide_b, F, c, WB)
+    if not graph_bounds(WA, rational, DA, SA, GA, KA, EA, HA):
+        return SPLIT, 0
+    if not graph_bounds(WB, rational, DB, SB, GB, KB, EB, HB):
         return SPLIT, 0
     for i in range(4):
         K = KA if i < 2 else KB
@@ -256,26 +268,42 @@ def judge(
     # what is not known of each surface's height over the common rectangle: the vaguer one is split
     info[5] = (HA[0, 1] - HA[0, 0]) * rx * rx + 2.0 * (HA[1, 1] - HA[1, 0]) * rx * ry + (HA[2, 1] - HA[2, 0]) * ry * ry
     info[6] = (HB[0, 1] - HB[0, 0]) * rx * rx + 2.0 * (HB[1, 1] - HB[1, 0]) * rx * ry + (HB[2, 1] - HB[2, 0]) * ry * ry
-    mxx = max(abs(hxx0), abs(hxx1))
-    mxy = max(abs(hxy0), abs(hxy1))
-    myy = max(abs(hyy0), abs(hyy1))
-    slope = abs(f[1]) * rx + abs(f[2]) * ry
-    bend = 0.5 * (mxx * rx * rx + 2.0 * mxy * rx * ry + myy * ry * ry)
-    # height above the plane is at least the distance times the cosines; 1e-15: round-off of unit-size coordinates
-    if abs(f[0]) > slope + bend + tol + 4e-15:
-        return EXCLUDED, 0
     g = math.sqrt(f[1] * f[1] + f[2] * f[2])
-    if g > 0.0:
-        gx = f[1] / g
-        gy = f[2] / g
-        sx = max(abs(gx * hxx0 + gy * hxy0), abs(gx * hxx1 + gy * hxy1))
-        sx = max(sx, max(abs(gx * hxx0 + gy * hxy1), abs(gx * hxx1 + gy * hxy0)))
-        sy = max(abs(gx * hxy0 + gy * hyy0), abs(gx * hxy1 + gy * hyy1))
-        sy = max(sy, max(abs(gx * hxy0 + gy * hyy1), abs(gx * hxy1 + gy * hyy0)))
-        if g > sx * rx + sy * ry + 1e-14:
-            if abs(f[0]) > slope + bend + 4e-15:
-                return EXCLUDED, 0  # no zero here, however near the surfaces are
-            return transversal(A, B, box_a, box_b, xm, ym, rx, ry, gx, gy, f[0] / g, tol, found, work)
+    slope = abs(f[1]) * rx + abs(f[2]) * ry
+    for order in range(2, 4):
+        if order == 3:  # only where what is not known of the curvature hides height and slope
+            if abs(f[0]) + slope > 2.0 * (info[5] + info[6]):
+                break
+            third_graph_bounds(WA, rational, DA, SA, GA, KA, EA, HA, TA)
+            third_graph_bounds(WB, rational, DB, SB, GB, KB, EB, HB, TB)
+            s0 = max(abs(TA[0, 0] - TB[0, 1]), abs(TA[0, 1] - TB[0, 0]))
+            s1 = max(abs(TA[1, 0] - TB[1, 1]), abs(TA[1, 1] - TB[1, 0]))
+            s2 = max(abs(TA[2, 0] - TB[2, 1]), abs(TA[2, 1] - TB[2, 0]))
+            s3 = max(abs(TA[3, 0] - TB[3, 1]), abs(TA[3, 1] - TB[3, 0]))
+            hxx0 = max(hxx0, f[3] - s0 * rx - s1 * ry)
+            hxx1 = min(hxx1, f[3] + s0 * rx + s1 * ry)
+            hxy0 = max(hxy0, f[4] - s1 * rx - s2 * ry)
+            hxy1 = min(hxy1, f[4] + s1 * rx + s2 * ry)
+            hyy0 = max(hyy0, f[5] - s2 * rx - s3 * ry)
+            hyy1 = min(hyy1, f[5] + s2 * rx + s3 * ry)
+        mxx = max(abs(hxx0), abs(hxx1))
+        mxy = max(abs(hxy0), abs(hxy1))
+        myy = max(abs(hyy0), abs(hyy1))
+        bend = 0.5 * (mxx * rx * rx + 2.0 * mxy * rx * ry + myy * ry * ry)
+        # height above the plane is at least the distance times the cosines; 1e-15: round-off of unit-size coordinates
+        if abs(f[0]) > slope + bend + tol + 4e-15:
+            return EXCLUDED, 0
+        if g > 0.0:
+            gx = f[1] / g
+            gy = f[2] / g
+            sx = max(abs(gx * hxx0 + gy * hxy0), abs(gx * hxx1 + gy * hxy1))
+            sx = max(sx, max(abs(gx * hxx0 + gy * hxy1), abs(gx * hxx1 + gy * hxy0)))
+            sy = max(abs(gx * hxy0 + gy * hyy0), abs(gx * hxy1 + gy * hyy1))
+            sy = max(sy, max(abs(gx * hxy0 + gy * hyy1), abs(gx * hxy1 + gy * hyy0)))
+            if g > sx * rx + sy * ry + 1e-14:
+                if abs(f[0]) > slope + bend + 4e-15:
+                    return EXCLUDED, 0  # no zero here, however near the surfaces are
+                return transversal(A, B, box_a, box_b, xm, ym, rx, ry, gx, gy, f[0] / g, tol, found, work)
     if abs(f[0]) + slope + bend <= max(0.01 * tol, 8e-15):
         centre = SINGULAR
         for k in range(3):
@@ -432,9 +460,9 @@ def transversal(
 ) -> tuple[int, int]:  # fmt: skip
     """Points on the only arc the pair can hold: one inside, several where the pieces end."""
     F, c, w, p = work[:4]
-    bu, bv, h, ja, jb = work[16:21]
-    frame = work[23]
-    scratch = work[24]
+    bu, bv, h, ja, jb = work[23:28]
+    frame = work[30]
+    scratch = work[31]
     border = False
     for k in range(2):
         border |= box_a[2 * k] <= 0.0 or box_a[2 * k + 1] >= 1.0 or box_b[2 * k] <= 0.0 or box_b[2 * k + 1] >= 1.0
@@ -460,6 +488,7 @@ def transversal(
     out = scratch[4]
     d = scratch[5]
     ahead = scratch[6:8]  # where the slices next to the middle one lead to
+    along = scratch[8:13]  # the parameters at the slices in order
     for k in range(4):
         signs[k, 0] = signs[k, 1] = out[k] = 0.0
     known = False
@@ -499,6 +528,7 @@ def transversal(
                 signs[k, 1] = 1.0
             if not (0.0 <= p[k] <= 1.0):
                 out[k] = 1.0
+            along[2 + i, k] = p[k]
         if on_pieces(p, ja, jb, 2.0 * tol):
             for k in range(4):
                 found[count, k] = min(max(p[k], 0.0), 1.0)
@@ -506,7 +536,20 @@ def transversal(
                 found[count, 4 + k] = 0.5 * (ja[0, k] + jb[0, k])
             found[count, 7] = gap
             count += 1
-    if solved == 0 or count == 0:
+    if count == 0:
+        if solved == 5:  # the whole arc may pass by beyond a piece's end
+            for k in range(4):
+                d[k] = 0.0
+                least = math.inf
+                for i in range(5):
+                    least = min(least, max(-along[i, k], along[i, k] - 1.0))
+                    if (along[i, k] > 0.5) != (along[0, k] > 0.5):
+                        least = -1.0
+                    if 0 < i < 4:  # a parabola dips an eighth of this between samples
+                        d[k] = max(d[k], abs(along[i - 1, k] - 2.0 * along[i, k] + along[i + 1, k]))
+                jet = ja[1 + k] if k < 2 else jb[k - 1]
+                if least > 0.25 * d[k] + 2.0 * tol / max(math.sqrt(dot(jet, jet)), 1e-300):
+                    return EXCLUDED, 0
         return SPLIT, 0
     for k in range(4):  # an arc that bulges over the end of a piece may come back between the slices
         if out[k] > 0.0 and signs[k, 0] > 0.0 and signs[k, 1] > 0.0 and rt > 1e-5:
@@ -588,10 +631,11 @@ def subdivide(
     q = np.empty(3)
     work = (
         np.empty((3, 3)), np.empty(3), np.empty(4), np.empty(4), np.empty(6), np.empty((P, Q, 4)),
-        np.empty((R, S, 4)), np.empty((P, Q, 4)), np.empty((R, S, 4)), np.empty((5, 4, 2)), np.empty((3, 2)),
-        np.empty((5, 3, 2)), np.empty((2, 2)), np.empty((2, 2)), np.empty((3, 2)), np.empty((3, 2)),
-        np.empty((3, most)), np.empty((3, most)), np.empty((6, 4)), np.empty((6, 3)), np.empty((6, 3)),
-        np.empty(6), np.empty(6), np.empty((FRAME, 4)), np.empty((12, 4)),
+        np.empty((R, S, 4)), np.empty((P, Q, 4)), np.empty((R, S, 4)), np.empty((9, 4, 2)), np.empty((9, 4, 2)),
+        np.empty((3, 2)), np.empty((3, 2)), np.empty((9, 3, 2)), np.empty((9, 3, 2)), np.empty((2, 2)),
+        np.empty((2, 2)), np.empty((6, 2)), np.empty((6, 2)), np.empty((3, 2)), np.empty((3, 2)), np.empty((4, 2)),
+        np.empty((4, 2)), np.empty((3, most)), np.empty((3, most)), np.empty((6, 4)), np.empty((6, 3)),
+        np.empty((6, 3)), np.empty(6), np.empty(6), np.empty((FRAME, 4)), np.empty((13, 4)),
     )  # fmt: skip
     for first in range(ka):
         for second in range(kb):

@@ -15,7 +15,7 @@ from patchwright.models._compile_kernel import inner, kernel
 from patchwright.models.arrays import Array, IntArray
 from patchwright.ssi._jet_kernel import FRAME, curve_jet, dot, jets, normals, slice_newton
 
-BORDER, CLOSED, BALL, STUCK = range(4)
+BORDER, CLOSED, BALL, STUCK, PARTED = range(5)
 STEP = 1e-9  # Newton's last step: the next would be its square, below round-off
 MOST = 4000  # nodes of an arc on one pair of pieces
 NODE = 22  # 3 x 7 jet, then the length of the piece that begins at the node
@@ -126,11 +126,31 @@ def slack(j: Array, k: int, tol: float) -> float:
 
 
 @inner
+def towards(balls: Array, a: Array, step: float) -> tuple[float, int]:
+    """The step shortened so that it ends well inside a ball it would enter or jump over, and the number of that ball,
+    -1 for none. `a` begins with x and holds the tangent from 7 on."""
+    entering = -1
+    for i in range(balls.shape[0]):
+        along = 0.0
+        far = 0.0
+        for c in range(3):
+            d = balls[i, c] - a[c]
+            along += d * a[7 + c]
+            far += d * d
+        aside = math.sqrt(max(far - along * along, 0.0))
+        r = balls[i, 3]
+        if far > r * r and along > 0.0 and aside < 0.8 * r + 0.1 * along and along - 0.5 * r < step:
+            step = max(along - 0.5 * r, 0.1 * r)
+            entering = i
+    return step, entering
+
+
+@inner
 def march(
-    A: Array, B: Array, w: Array, T0: Array, balls: Array, home: Array, longest: float, fit: float, tol: float,
-    nodes: Array, work: tuple[Array, ...],
+    A: Array, B: Array, w: Array, T0: Array, balls: Array, home: Array, longest: float, begin: float, fit: float,
+    tol: float, nodes: Array, work: tuple[Array, ...],
 ) -> tuple[int, int, int]:  # fmt: skip
-    """Nodes from w along T0: their number, how it ended, and in which ball."""
+    """Nodes from w along T0, the first step `begin`: their number, how it ended, and in which ball."""
     bu, bv, h, ja, jb, frame, p, new, mid, jet = work
     T = frame[7]
     jets(A, w[0], w[1], bu, bv, h, ja)
@@ -152,7 +172,7 @@ def march(
         leaves = (x <= d and v * longest < -2.0 * d) or (x >= 1.0 - d and v * longest > 2.0 * d)
         if leaves and (x + v * 1e-7 < -d or x + v * 1e-7 > 1.0 + d):
             return n, BORDER, -1
-    step = longest
+    step = begin
     tries = 0
     travelled = 0.0
     while n < nodes.shape[0] - 1:
@@ -161,19 +181,7 @@ def march(
         if tries > 60 or step < 1e-11:
             return n, STUCK, -1
         step = min(step, longest)
-        entering = -1
-        for i in range(balls.shape[0]):
-            along = 0.0
-            far = 0.0
-            for c in range(3):
-                d = balls[i, c] - a[c]
-                along += d * a[7 + c]
-                far += d * d
-            aside = math.sqrt(max(far - along * along, 0.0))
-            r = balls[i, 3]
-            if far > r * r and along > 0.0 and aside < 0.8 * r + 0.1 * along and along - 0.5 * r < step:
-                step = max(along - 0.5 * r, 0.1 * r)
-                entering = i
+        step, entering = towards(balls, a, step)
         for k in range(4):
             p[k] = a[3 + k] + step * (a[10 + k] + 0.5 * step * a[17 + k])
         level = 0.0
@@ -301,20 +309,23 @@ def march(
 
 @kernel
 def trace(
-    A: Array, B: Array, seeds: Array, balls: Array, longest: float, fit: float, tol: float, room: Array
+    nets_a: Array, nets_b: Array, which: IntArray, firsts: IntArray, seeds: Array, balls: Array, longest: float,
+    fit: float, tol: float,
 ) -> tuple[Array, IntArray]:  # fmt: skip
-    """Arcs through the seeds (k, 7) u v s t x y z: nodes (n, NODE) and one row per arc: first node, end, how it
-    ended behind and ahead, the balls. `room` (2, MOST, NODE) is scratch."""
-    most = max(max(A.shape[0], A.shape[1]), max(B.shape[0], B.shape[1])) + 1
+    """Arcs of pairs of pieces `which` (g, 2) through the seeds (k, 7) u v s t x y z, those of pair i from firsts[i] to
+    firsts[i + 1]: nodes (n, NODE) and one row per arc: first node, end, how it ended behind and ahead, the balls, the
+    pair's number."""
+    most = max(max(nets_a.shape[1], nets_a.shape[2]), max(nets_b.shape[1], nets_b.shape[2])) + 1
     work = (
         np.empty((3, most)), np.empty((3, most)), np.empty((6, 4)), np.empty((6, 3)), np.empty((6, 3)),
         np.empty((FRAME, 4)), np.empty(4), np.empty(NODE), np.empty(7), np.empty((3, 7)),
     )  # fmt: skip
     bu, bv, h, ja, jb, frame, _, _, _, jet = work
-    ahead = room[0]
-    behind = room[1]
+    ahead = np.empty((MOST, NODE))
+    behind = np.empty((MOST, NODE))
     nodes = np.empty((512, NODE))
-    arcs = np.empty((64, 6), np.int64)
+    arcs = np.empty((64, 7), np.int64)
+    begin = longest
     n = 0
     m = 0
     w = np.empty(4)
@@ -329,107 +340,114 @@ def trace(
                 far += (balls[i, c] - seeds[k, 4 + c]) ** 2
             if far < 1.02 * balls[i, 3] ** 2:
                 done[k] = True
-    for turn in range(2 * seeds.shape[0]):  # points exactly on their pieces first, those within the tolerance after
-        k = turn % seeds.shape[0]
-        exact = turn < seeds.shape[0]
-        if done[k]:
-            continue
-        for i in range(4):
-            w[i] = seeds[k, i]
-        jets(A, w[0], w[1], bu, bv, h, ja)
-        jets(B, w[2], w[3], bu, bv, h, jb)
-        if normals(ja, jb, frame) <= 0.0:
-            continue
-        T[:] = frame[4, :3]
-        gap = slice_newton(A, B, w, T, 0.5 * (dot(T, ja[0]) + dot(T, jb[0])), 10, bu, bv, h, ja, jb, frame, 1e-13)
-        if gap < 0.0:
-            continue
-        out_of = 0.0
-        for i in range(4):
-            out_of = max(out_of, max(-w[i], w[i] - 1.0))
-            w[i] = min(max(w[i], 0.0), 1.0)
-        if exact and out_of > 1e-12:
-            continue
-        done[k] = True
-        if out_of > 0.02:
-            continue
-        jets(A, w[0], w[1], bu, bv, h, ja)
-        jets(B, w[2], w[3], bu, bv, h, jb)
-        if normals(ja, jb, frame) <= 0.0:
-            continue
-        if not curve_jet(ja, jb, frame, 1.0 if dot(frame[4], T) > 0.0 else -1.0, w, jet):
-            continue
-        home[0] = 1.0  # the start is a goal: closed loops
-        for i in range(21):
-            home[1 + i] = jet[i // 7, i % 7]
-        n1, e1, b1 = march(A, B, w, T, balls, home, longest, fit, tol, ahead, work)
-        if n1 == 0:
-            continue
-        n2 = 1
-        e2 = e1
-        b2 = -1
-        if e1 != CLOSED:
-            home[0] = 0.0
-            T[:] = -ahead[0, 7:10]
-            n2, e2, b2 = march(A, B, w, T, balls, home, longest, fit, tol, behind, work)
-        total = n1 + n2 - 1
-        while n + total > nodes.shape[0]:
-            bigger = np.empty((2 * nodes.shape[0], NODE))
-            bigger[:n] = nodes[:n]
-            nodes = bigger
-        for i in range(n2 - 1):
-            row = nodes[n + i]
-            back = behind[n2 - 1 - i]
-            for q in range(21):
-                row[q] = -back[q] if 7 <= q < 14 else back[q]
-            row[21] = behind[n2 - 2 - i, 21]
-        for i in range(n1):
-            nodes[n + n2 - 1 + i] = ahead[i]
-        if m == arcs.shape[0]:
-            more = np.empty((2 * m, 6), np.int64)
-            more[:m] = arcs
-            arcs = more
-        arcs[m, 0] = n
-        arcs[m, 1] = n + total
-        arcs[m, 2] = e2
-        arcs[m, 3] = e1
-        arcs[m, 4] = b2
-        arcs[m, 5] = b1
-        # seeds on this arc need no arc of their own
-        for q in range(seeds.shape[0]):
-            if done[q]:
+    for g in range(which.shape[0]):
+        A = nets_a[which[g, 0]]
+        B = nets_b[which[g, 1]]
+        count = firsts[g + 1] - firsts[g]
+        for turn in range(2 * count):  # points exactly on their pieces first, those within the tolerance after
+            k = firsts[g] + turn % count
+            exact = turn < count
+            if done[k]:
                 continue
-            for i in range(n, n + total - 1):
-                L = nodes[i, 21]
-                far = 0.0
-                t = 0.0
-                for c in range(3):
-                    d = seeds[q, 4 + c] - nodes[i, c]
-                    far += d * d
-                    t += d * nodes[i, 7 + c]
-                if far > 1.1 * L * L + 1e-15 or L <= 0.0:
+            for i in range(4):
+                w[i] = seeds[k, i]
+            jets(A, w[0], w[1], bu, bv, h, ja)
+            jets(B, w[2], w[3], bu, bv, h, jb)
+            if normals(ja, jb, frame) <= 0.0:
+                continue
+            T[:] = frame[4, :3]
+            gap = slice_newton(A, B, w, T, 0.5 * (dot(T, ja[0]) + dot(T, jb[0])), 10, bu, bv, h, ja, jb, frame, 1e-13)
+            if gap < 0.0:
+                continue
+            out_of = 0.0
+            for i in range(4):
+                out_of = max(out_of, max(-w[i], w[i] - 1.0))
+                w[i] = min(max(w[i], 0.0), 1.0)
+            if exact and out_of > 1e-12:
+                continue
+            done[k] = True
+            if out_of > 0.02:
+                continue
+            jets(A, w[0], w[1], bu, bv, h, ja)
+            jets(B, w[2], w[3], bu, bv, h, jb)
+            if normals(ja, jb, frame) <= 0.0:
+                continue
+            if not curve_jet(ja, jb, frame, 1.0 if dot(frame[4], T) > 0.0 else -1.0, w, jet):
+                continue
+            home[0] = 1.0  # the start is a goal: closed loops
+            for i in range(21):
+                home[1 + i] = jet[i // 7, i % 7]
+            n1, e1, b1 = march(A, B, w, T, balls, home, longest, begin, fit, tol, ahead, work)
+            if n1 == 0:
+                continue
+            if n1 > 3:
+                begin = min(longest, max(2.0 * ahead[n1 - 3, 21], 1e-3 * longest))  # the last piece is cut off
+            n2 = 1
+            e2 = e1
+            b2 = -1
+            if e1 != CLOSED:
+                home[0] = 0.0
+                T[:] = -ahead[0, 7:10]
+                n2, e2, b2 = march(A, B, w, T, balls, home, longest, begin, fit, tol, behind, work)
+            total = n1 + n2 - 1
+            while n + total > nodes.shape[0]:
+                bigger = np.empty((2 * nodes.shape[0], NODE))
+                bigger[:n] = nodes[:n]
+                nodes = bigger
+            for i in range(n2 - 1):
+                row = nodes[n + i]
+                back = behind[n2 - 1 - i]
+                for q in range(21):
+                    row[q] = -back[q] if 7 <= q < 14 else back[q]
+                row[21] = behind[n2 - 2 - i, 21]
+            for i in range(n1):
+                nodes[n + n2 - 1 + i] = ahead[i]
+            if m == arcs.shape[0]:
+                more = np.empty((2 * m, 7), np.int64)
+                more[:m] = arcs
+                arcs = more
+            arcs[m, 0] = n
+            arcs[m, 1] = n + total
+            arcs[m, 2] = e2
+            arcs[m, 3] = e1
+            arcs[m, 4] = b2
+            arcs[m, 5] = b1
+            arcs[m, 6] = g
+            # seeds on this arc need no arc of their own
+            for q in range(firsts[g], firsts[g + 1]):
+                if done[q]:
                     continue
-                t /= L
-                for _ in range(5):
-                    hermite(nodes[i], nodes[i + 1], L, t, mid)
-                    d = 0.0
+                for i in range(n, n + total - 1):
+                    L = nodes[i, 21]
+                    far = 0.0
+                    t = 0.0
                     for c in range(3):
-                        d += (seeds[q, 4 + c] - mid[c]) * (nodes[i, 7 + c] * (1.0 - t) + nodes[i + 1, 7 + c] * t)
-                    t += d / L
-                    t = min(max(t, -0.1), 1.1)
-                if not (-1e-6 <= t * L <= L + 1e-6):
-                    continue
-                off = 0.0
-                for c in range(3):
-                    off += (seeds[q, 4 + c] - mid[c]) ** 2
-                aside = 0.0
-                for c in range(4):
-                    aside = max(aside, abs(seeds[q, c] - mid[3 + c]))
-                if off < 4e-16 + 16.0 * tol * tol and aside < 0.05:
-                    done[q] = True
-                    break
-        m += 1
-        n += total
+                        d = seeds[q, 4 + c] - nodes[i, c]
+                        far += d * d
+                        t += d * nodes[i, 7 + c]
+                    if far > 1.1 * L * L + 1e-15 or L <= 0.0:
+                        continue
+                    t /= L
+                    for _ in range(5):
+                        hermite(nodes[i], nodes[i + 1], L, t, mid)
+                        d = 0.0
+                        for c in range(3):
+                            d += (seeds[q, 4 + c] - mid[c]) * (nodes[i, 7 + c] * (1.0 - t) + nodes[i + 1, 7 + c] * t)
+                        t += d / L
+                        t = min(max(t, -0.1), 1.1)
+                    if not (-1e-6 <= t * L <= L + 1e-6):
+                        continue
+                    off = 0.0
+                    for c in range(3):
+                        off += (seeds[q, 4 + c] - mid[c]) ** 2
+                    aside = 0.0
+                    for c in range(4):
+                        aside = max(aside, abs(seeds[q, c] - mid[3 + c]))
+                    if off < 4e-16 + 16.0 * tol * tol and aside < 0.05:
+                        done[q] = True
+                        break
+            m += 1
+            n += total
     return nodes[:n].copy(), arcs[:m].copy()
 
 

@@ -16,14 +16,15 @@ from patchwright.models._compile_kernel import inner, kernel
 from patchwright.models.arrays import Array, IntArray
 from patchwright.ssi._graph_kernel import difference
 from patchwright.ssi._jet_kernel import cross, dot, jets, tangent_coordinates, unit
-from patchwright.ssi._tracing_kernel import BALL, BORDER, CLOSED, STUCK, slack
+from patchwright.ssi._tracing_kernel import BALL, BORDER, CLOSED, PARTED, STUCK, slack, towards
 
 
 @inner
 def bottom(
     A: Array, B: Array, w: Array, T: Array, level: float, everywhere: Array, work: tuple[Array, ...], row: Array
 ) -> bool:
-    """Move w to the valley's bottom in the plane T . x = level; row = x, w, then their first derivatives, |f|."""
+    """Move w to the valley's bottom in the plane T . x = level; row = x, w, then their first derivatives, f
+    counted towards the open side."""
     F, c, f, ga, gb, bu, bv, h, ja, jb = work
     jets(A, w[0], w[1], bu, bv, h, ja)
     jets(B, w[2], w[3], bu, bv, h, jb)
@@ -64,7 +65,7 @@ def bottom(
     unit(row[7:10])
     for k in range(4):
         row[3 + k] = w[k]
-    row[14] = abs(f[0])
+    row[14] = f[0] if f[5] > 0.0 else -f[0]
     return tangent_coordinates(ja, row[7:10], row, 10) and tangent_coordinates(jb, row[7:10], row, 12)
 
 
@@ -72,7 +73,7 @@ def bottom(
 def trace_valleys(
     A: Array, B: Array, seeds: Array, balls: Array, longest: float, turn: float, tol: float
 ) -> tuple[Array, IntArray]:  # fmt: skip
-    """Arcs of tangency through the seeds (k, 7): rows of x, w, their first derivatives and |f|, and per arc first
+    """Arcs of tangency through the seeds (k, 7): rows of x, w, their first derivatives and f, and per arc first
     row, end, and how it ended behind and ahead, the balls."""
     most = max(max(A.shape[0], A.shape[1]), max(B.shape[0], B.shape[1])) + 1
     work = (
@@ -137,7 +138,7 @@ def trace_valleys(
         T[:] = row[7:10]
         for i in range(4):
             w[i] = row[3 + i]
-        if not bottom(A, B, w, T, dot(T, row), everywhere, work, row) or row[14] > tol:
+        if not bottom(A, B, w, T, dot(T, row), everywhere, work, row) or abs(row[14]) > tol:
             continue
         start = row.copy()
         counts = [0, 0]
@@ -157,6 +158,7 @@ def trace_valleys(
                     break
                 a_row = buf[count - 1]
                 T[:] = a_row[7:10]
+                step, _ = towards(balls, a_row, step)
                 for i in range(4):
                     w[i] = a_row[3 + i] + step * a_row[10 + i]
                 if not bottom(A, B, w, T, dot(T, a_row) + step, everywhere, work, row):
@@ -169,7 +171,11 @@ def trace_valleys(
                 if cosine < math.cos(turn):
                     step *= 0.6
                     continue
-                if row[14] > tol:
+                if abs(row[14]) > tol:
+                    if step > 1e-5 * longest:
+                        step *= 0.5
+                        continue
+                    code = PARTED if row[14] > 0.0 else STUCK
                     break
                 # borders
                 first = -1

@@ -14,13 +14,17 @@ from patchwright.ssi.intersection import CurveKind
 SAME = 1e-7  # of the size or the parameter range: ends nearer than this are one point
 
 
+STOPPED, APART = 1_000_000_000, 1_000_000_001  # ends of arcs that are no singular points
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Arc:
     """Jets along a curve: at node i the rows of `jets[i]` are x, uv_a, uv_b (7 numbers) and their first and second
     derivatives by arc length; `lengths[i]` is that of the piece from node i to i + 1.
 
-    `ends` are the numbers of the singular points at which it begins and ends, -1 for none; `smooth[i]` tells whether
-    the first derivatives at node i are the same on both sides.
+    `ends` are the numbers of the singular points at which it begins and ends, -1 for none, STOPPED where it could not
+    be followed on, APART where the surfaces it touches part; `smooth[i]` tells whether the first derivatives at node i
+    are the same on both sides.
     """
 
     jets: Array
@@ -204,6 +208,8 @@ def joined(arcs: list[Arc], scale: Array) -> list[Arc]:
 
 
 def _chained(chain: list[Arc], closed: bool) -> Arc:
+    if len(chain) == 1:
+        return replace(chain[0], closed=closed)
     jets, lengths = [chain[0].jets], [chain[0].lengths]
     breaks: list[Array] = [np.ones(chain[0].jets.shape[0])]
     for arc in chain[1:]:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Sequence
+from functools import cache
 
 import numpy as np
 
@@ -18,7 +19,6 @@ from patchwright.models.surface import Surface
 from patchwright.ssi.arcs import Arc
 from patchwright.ssi.intersection import IntersectionCurve
 
-SAMPLES = 20  # per piece; a piece has two nodes
 DEGREE = 5
 
 
@@ -75,7 +75,7 @@ def _curve(arc: Arc, net: Array, residual: float) -> IntersectionCurve:
 
 def _residuals(nets: Sequence[Array], a: Surface, b: Surface) -> list[float]:
     """The largest distance between each curve, its image on a and that on b on samples inside every piece."""
-    at = np.tensordot(np.concatenate(nets), _BERNSTEIN, axes=(1, 1)).swapaxes(1, 2).reshape(-1, 7)
+    at = np.concatenate([(_bernstein(_samples(net)) @ net).reshape(-1, 7) for net in nets])
     places = [at[:, :3]]
     for w, surface in ((at[:, 3:5], a), (at[:, 5:7], b)):
         (u0, u1), (v0, v1) = surface.domain
@@ -84,10 +84,17 @@ def _residuals(nets: Sequence[Array], a: Surface, b: Surface) -> list[float]:
     for one, other in itertools.combinations(places, 2):
         gap = one - other
         np.maximum(worst, np.einsum("ij,ij->i", gap, gap), out=worst)
-    first = np.cumsum([0] + [SAMPLES * len(net) for net in nets[:-1]])
+    first = np.cumsum([0] + [_samples(net) * len(net) for net in nets[:-1]])
     return [float(far) for far in np.sqrt(np.maximum.reduceat(worst, first))]
 
 
-_T = (np.arange(SAMPLES) + 0.5)[:, None] / SAMPLES
-_K = np.arange(DEGREE + 1)
-_BERNSTEIN = np.array([math.comb(DEGREE, k) for k in range(DEGREE + 1)]) * _T**_K * (1.0 - _T) ** (DEGREE - _K)
+def _samples(net: Array) -> int:
+    """Samples per piece: over ten times more than the nodes, n + 1 for n pieces."""
+    return 20 if len(net) < 10 else 11
+
+
+@cache
+def _bernstein(samples: int) -> Array:
+    """(samples, DEGREE + 1) the Bernstein polynomials at the middles of equal parts of [0, 1]."""
+    t, k = (np.arange(samples) + 0.5)[:, None] / samples, np.arange(DEGREE + 1)
+    return np.array([math.comb(DEGREE, i) for i in k]) * t**k * (1.0 - t) ** (DEGREE - k)

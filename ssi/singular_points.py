@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -12,6 +12,7 @@ from patchwright.ssi.bezier_pieces import BezierPieces
 
 RADIUS = 1e-3  # of the size: inside, a branch is one piece from its last node to the point
 CLUSTER = 2e-3  # the same where more than two branches meet: nearer, angles of 1e-6 cost the points their digits
+MOST = 64  # clusters examined for osculation
 MERGE = 1e-6  # of the size: contacts nearer than this are one
 
 
@@ -19,8 +20,8 @@ MERGE = 1e-6  # of the size: contacts nearer than this are one
 class Ball:
     """A singular point and the ball in which arcs are led straight to it (scaled coordinates).
 
-    `places` are its local parameters (4,) in the pairs of pieces that hold it; `kind` is "branch", "touch", "cluster"
-    (boxes left at the tolerance) or "pole".
+    `places` are its local parameters (4,) in the pairs of pieces that hold it; `kind` is "branch", "touch",
+    "osculation" (the surfaces agree to second order) or "cluster" (boxes left at the tolerance; `pole`: at one).
     """
 
     centre: Array
@@ -30,6 +31,7 @@ class Ball:
     places: tuple[tuple[tuple[int, int], Array], ...]
     rows: Array = field(default_factory=lambda: np.empty((0, 20)))
     pole: bool = False
+    lead: Callable[[Array, Array, tuple[int, int]], tuple[Array, Array]] | None = None
 
 
 def balls_of(rows: Array, tol: float, pieces: tuple[BezierPieces, BezierPieces]) -> tuple[list[Ball], list[Ball]]:
@@ -51,6 +53,7 @@ def balls_of(rows: Array, tol: float, pieces: tuple[BezierPieces, BezierPieces])
             out.append(Ball(centre, radius, kind, float(part[:, 18].max()), tuple(places.items())))
     tangent = rows[codes == TANGENT][:, 15:18]
     left = rows[codes == SINGULAR]
+    out += _osculations(left, rows, tol, pieces)
     if left.size and out:
         far = np.array([np.linalg.norm(left[:, 15:18] - ball.centre, axis=1) - ball.radius for ball in out]).min(axis=0)
         left = left[far > 4.0 * left[:, 18]]
@@ -79,6 +82,46 @@ def balls_of(rows: Array, tol: float, pieces: tuple[BezierPieces, BezierPieces])
                 radius = max(radius, CLUSTER)
             out.append(Ball(centre, radius, "cluster", 0.0, tuple(places.items()), part, pole))
     return out, plain
+
+
+def _osculations(left: Array, rows: Array, tol: float, pieces: tuple[BezierPieces, BezierPieces]) -> list[Ball]:
+    """Points of second-order contact next to boxes left over, each once."""
+    from patchwright.ssi.osculation import osculation
+
+    out: list[Ball] = []
+    for group in grouped(left[:, 15:18], 4.0 * float(np.median(left[:, 18])) + 16.0 * tol)[:MOST] if left.size else []:
+        row = left[group[np.argmax(left[group, 18])]]
+        if any(np.linalg.norm(row[15:18] - ball.centre) < ball.radius for ball in out):
+            continue
+        i, j = int(row[1]), int(row[2])
+        found = osculation(pieces[0].nets[i], pieces[1].nets[j], 0.5 * (row[3:11:2] + row[4:11:2]), tol)
+        if found is not None:
+            near = rows[np.linalg.norm(rows[:, 15:18] - found.point, axis=1) < 2.0 * CLUSTER]
+            places = places_of(found.point, near, pieces, 1e-9)
+            if places:
+                out.append(Ball(found.point, CLUSTER, "osculation", found.gap, places))
+    return out
+
+
+def places_of(
+    x: Array, rows: Array, pieces: tuple[BezierPieces, BezierPieces], reach: float
+) -> tuple[tuple[tuple[int, int], Array], ...]:
+    """The local parameters of a point in all pairs of pieces among findings that come as near as `reach`."""
+    from patchwright.ssi._tracing_kernel import surface_jets
+
+    feet: tuple[dict[int, Array], dict[int, Array]] = ({}, {})
+    for side in (0, 1):
+        for k, box in zip(rows[:, 1 + side].astype(int).tolist(), rows[:, 3 + 4 * side : 7 + 4 * side], strict=True):
+            if k in feet[side]:
+                continue
+            w = 0.5 * (box[::2] + box[1::2])
+            for _ in range(12):
+                jet = surface_jets(pieces[side].nets[k], w[None].copy())[0]
+                w = np.clip(w + np.linalg.lstsq(jet[1:3].T, x - jet[0], rcond=None)[0], -0.5, 1.5)
+            if np.linalg.norm(jet[0] - x) < reach and ((w > -1e-7) & (w < 1.0 + 1e-7)).all():
+                feet[side][k] = np.clip(w, 0.0, 1.0)
+    pairs = dict.fromkeys(zip(rows[:, 1].astype(int).tolist(), rows[:, 2].astype(int).tolist(), strict=True))
+    return tuple(((i, j), np.concatenate((feet[0][i], feet[1][j]))) for i, j in pairs if i in feet[0] and j in feet[1])
 
 
 def _steepest(places: dict[tuple[int, int], Array], pieces: tuple[BezierPieces, BezierPieces]) -> float:
@@ -192,6 +235,8 @@ def arc_to_centre(jets: Array, lengths: Array, side: int, ball: Ball, which: tup
         more = more[::-1].copy()
         more[:, 1] *= -1.0
         return more, longer[::-1].copy()
+    if ball.lead is not None:
+        return ball.lead(jets, lengths, which)
     a, b, L = jets[-2], jets[-1], float(lengths[-1])
     ahead = float((ball.centre - b[0, :3]) @ b[1, :3])
     ahead = max(ahead, 1e-3 * float(np.linalg.norm(ball.centre - b[0, :3])))
@@ -203,7 +248,7 @@ def arc_to_centre(jets: Array, lengths: Array, side: int, ball: Ball, which: tup
     end[1] /= length
     end[0, :3] = ball.centre
     for pair, w in ball.places:
-        if pair == which and ball.kind == "branch":
+        if pair == which and ball.kind in ("branch", "osculation"):
             end[0, 3:] = w
     end[0, 3:] = np.clip(end[0, 3:], 0.0, 1.0)
     chord = float(np.linalg.norm(ball.centre - b[0, :3]))

@@ -39,28 +39,31 @@ def wavy(k: int) -> tuple[NurbsSurface, NurbsSurface]:
     return waves, graph(lambda x, y: 0.03 + 0.02 * np.sin(3.0 * x + y), spans=3)
 
 
-def contour(a: NurbsSurface, b: NurbsSurface, samples: int = 1201) -> tuple[int, float]:
-    """Number and total length of the zero contours of z_a - z_b for two graphs over the unit square, by marching
-    squares with linear interpolation: loops counted by union of the segments' ends."""
+def contour(a: NurbsSurface, b: NurbsSurface, samples: int = 1201) -> tuple[int, float, float]:
+    """Number and total length, in the plane and in space, of the zero contours of z_a - z_b for two graphs over the
+    unit square, by marching squares with linear interpolation: loops counted by union of the segments' ends."""
     t = np.linspace(0.0, 1.0, samples)
-    f = a.grid(t, t)[..., 2] - b.grid(t, t)[..., 2]
+    z = b.grid(t, t)[..., 2]
+    f = a.grid(t, t)[..., 2] - z
     from scipy.ndimage import label
 
     h = t[1]
-    length = 0.0
+    height = [z[:-1, :-1], z[1:, :-1], z[1:, 1:], z[:-1, 1:]]
     corner = [f[:-1, :-1], f[1:, :-1], f[1:, 1:], f[:-1, 1:]]
     place = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)]
-    ends, seen = np.zeros((2, *corner[0].shape, 2)), np.zeros(corner[0].shape, dtype=int)
+    ends, seen = np.zeros((2, *corner[0].shape, 3)), np.zeros(corner[0].shape, dtype=int)
     for k in range(4):
         p, q = corner[k], corner[(k + 1) % 4]
         cut = p * q < 0.0
         s = np.where(cut, p / np.where(cut, p - q, 1.0), 0.0)
         (x0, y0), (x1, y1) = place[k], place[(k + 1) % 4]
-        at = np.stack((x0 + s * (x1 - x0), y0 + s * (y1 - y0)), axis=-1)
+        lift = (height[k] + s * (height[(k + 1) % 4] - height[k])) / h
+        at = np.stack((x0 + s * (x1 - x0), y0 + s * (y1 - y0), lift), axis=-1)
         for n in (0, 1):
             pick = cut & (seen == n)
             ends[n][pick] = at[pick]
         seen += cut
     two = seen == 2
-    length = float(h * np.linalg.norm(ends[0][two] - ends[1][two], axis=-1).sum())
-    return int(label(f > 0.0)[1]), length
+    d = h * (ends[0][two] - ends[1][two])
+    flat_length, length = (float(np.linalg.norm(d[:, :k], axis=1).sum()) for k in (2, 3))
+    return int(label(f > 0.0)[1]), flat_length, length
