@@ -1,7 +1,7 @@
-"""The ladder for CAD faces: keep them, sew round-off, cap planar openings when asked, or refuse with the places.
+"""The ladder for CAD faces: keep, sew round-off, heal open seams, cap planar openings when asked, or refuse.
 
-Faces are never touched: a kept face has the surface it came with, checked to 1e-12. The sewing tolerance is found from
-the data, and a seam counts as closed only by the distance measured between its two surfaces.
+A kept face has the surface it came with, checked to 1e-12. The sewing tolerance is found from the data, and a seam
+counts as closed only by the distance measured between its two surfaces. What healing does is in `cad_heal`.
 """
 
 from __future__ import annotations
@@ -17,7 +17,9 @@ from patchwright.models.cad.seams import measure_seams
 from patchwright.models.cad.sewing import SewnResult, free_edge_curve, sew
 from patchwright.models.tolerance import Tolerance
 from patchwright.models.triangulation import Triangulation
+from patchwright.repair.cad_draft import Change
 from patchwright.repair.cad_grid import cad_grid
+from patchwright.repair.cad_heal import Healed, heal
 from patchwright.repair.deviation import two_sided
 from patchwright.repair.diagnosing import diagnose
 from patchwright.repair.diagnosis import Defect, Diagnosis
@@ -32,7 +34,7 @@ LEFT = {"opening", "parametrisation", "component", "thin", "unit", "far-field", 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Outcome:
-    """The assembly after keeping, sewing and capping, with the words for the ledger.
+    """The assembly after keeping, sewing, healing and capping, with the words for the ledger.
 
     `caps` are the parts that close openings, `around` the faces along each.
     """
@@ -40,6 +42,7 @@ class _Outcome:
     assembly: Assembly
     sewn: SewnResult | None
     reason: str
+    healed: Healed | None = None
     caps: tuple[int, ...] = ()
     around: tuple[tuple[int, ...], ...] = ()
 
@@ -47,17 +50,20 @@ class _Outcome:
 def repair_cad(
     model: Assembly, tolerance: Tolerance, *, openings: str, diagnosis: Diagnosis, progress: Progress
 ) -> Repaired:
-    """Keep the faces of a CAD model and sew them where only round-off separates them.
+    """Keep the faces of a CAD model, sew them where only round-off separates them, and heal the seams that are open.
 
-    A model with gaps, crossing faces or invalid faces is refused: no single face can be replaced yet without touching
-    its neighbours. `scope="all"` resurfaces the whole tessellation on the true surfaces instead, and the message says
-    so. `openings="close"` closes planar openings by trimmed planes on the openings' own edges.
+    What no rung closes is refused with its place; `scope="all"` resurfaces the whole tessellation on the true surfaces
+    instead, and the message says so. `openings="close"` closes planar openings by trimmed planes on their own edges.
     """
     progress("sewing", 0.2)
     outcome = _sewn(model)
+    progress("healing open seams", 0.3)
+    healed = heal(outcome.assembly, model.diagonal)
+    if healed is not None:
+        outcome = replace(outcome, assembly=healed.assembly, healed=healed)
     after = diagnosis
-    if outcome.sewn is not None:
-        progress("checking the sewn shell", 0.6)
+    if outcome.sewn is not None or healed is not None:
+        progress("checking the mended shell", 0.6)
         after = diagnose(outcome.assembly, tolerance=tolerance)
     problems = tuple(_problem(d) for d in after.defects if d.severity == "error" and d.kind not in LEFT)
     if openings == "close" and not problems:
@@ -83,18 +89,10 @@ def repair_cad(
     areas = np.array([part.triangulation.areas.sum() for part in outcome.assembly.parts])
     on_cap = None if body.tags is None else caps[body.tags]
     deviation = two_sided(model.triangulation, body, tolerance.fit, skip_after=on_cap)
-    verdict = Verdict.CLEAN if outcome.sewn is None else Verdict.REPAIRED
+    verdict = Verdict.CLEAN if outcome.sewn is None and outcome.healed is None else Verdict.REPAIRED
     if outcome.caps:
         verdict = Verdict.INVENTED
-    rung = Rung.KEEP if outcome.sewn is None else Rung.WELD
-    around = dict(zip(outcome.caps, outcome.around, strict=True))
-    names = outcome.assembly.names
-    faces = tuple(
-        Face(p.name, tuple(names[k] for k in around[i]), Rung.BRIDGE, float("nan"), 1.0, float(areas[i]))
-        if caps[i]
-        else Face(p.name, (p.name,), rung, 0.0, 0.0, float(areas[i]))
-        for i, p in enumerate(outcome.assembly.parts)
-    )
+    faces = _faces(outcome, areas)
     invented = float(areas[caps].sum() / areas.sum()) if outcome.caps else 0.0
     return Repaired(
         verdict,
@@ -162,16 +160,44 @@ def _capped(outcome: _Outcome) -> tuple[_Outcome, tuple[Problem, ...]]:
     return replace(outcome, assembly=made.assembly, caps=made.caps, around=made.around), ()
 
 
+def _faces(outcome: _Outcome, areas: Array) -> tuple[Face, ...]:
+    """Every output face with the rung that made or changed it and how far that moved it."""
+    names = outcome.assembly.names
+    around = dict(zip(outcome.caps, outcome.around, strict=True))
+    changed: dict[int, Change] = {}
+    for change in outcome.healed.changes if outcome.healed else ():
+        for face in change.faces:
+            if face not in changed or change.largest_move > changed[face].largest_move:
+                changed[face] = change
+    untouched = Rung.KEEP if outcome.sewn is None else Rung.WELD
+    faces = []
+    for i, (name, area) in enumerate(zip(names, areas.tolist(), strict=True)):
+        if i in around:
+            faces.append(Face(name, tuple(names[k] for k in around[i]), Rung.BRIDGE, float("nan"), 1.0, area))
+        elif i in changed:
+            faces.append(Face(name, (name,), changed[i].rung, changed[i].largest_move, 0.0, area))
+        else:
+            faces.append(Face(name, (name,), untouched, 0.0, 0.0, area))
+    return tuple(faces)
+
+
 def _problem(defect: Defect) -> Problem:
     words = f"{defect.message}; no rung of --scope least closes it, --scope all resurfaces the tessellation"
     return Problem(defect.kind, _point(defect.where), float(defect.size), words)
 
 
 def _ledger(model: Assembly, outcome: _Outcome, before: Diagnosis, after: Diagnosis) -> tuple[LedgerEntry, ...]:
-    area = float(sum(p.triangulation.areas.sum() for p in model.parts))
+    changes = outcome.healed.changes if outcome.healed else ()
+    touched = {face for change in changes for face in change.faces}
+    kept = [p for i, p in enumerate(model.parts) if i not in touched]
+    area = float(sum(p.triangulation.areas.sum() for p in kept))
     entries = [
-        LedgerEntry("CAD faces kept", Rung.KEEP, (), "their surfaces are identical", count=len(model.parts), area=area)
+        LedgerEntry("CAD faces kept", Rung.KEEP, (), "their surfaces are identical", count=len(kept), area=area),
+        *(_entry(model, change) for change in changes),
     ]
+    if outcome.healed and outcome.healed.opened:
+        why = "their surfaces were farther apart than a closed seam; each face was given its own border"
+        entries.append(LedgerEntry("shared edges taken apart", Rung.CUT, (), why, count=outcome.healed.opened))
     if outcome.sewn is not None:
         change = float(outcome.sewn.surface_change.max(initial=0.0))
         entries.append(
@@ -185,7 +211,7 @@ def _ledger(model: Assembly, outcome: _Outcome, before: Diagnosis, after: Diagno
                 largest_move=change,
             )
         )
-    else:
+    elif not changes:
         entries.append(LedgerEntry("edges left as they were", Rung.KEEP, (), outcome.reason, count=0))
     for at, around in zip(outcome.caps, outcome.around, strict=True):
         part = outcome.assembly.parts[at]
@@ -214,6 +240,19 @@ def _ledger(model: Assembly, outcome: _Outcome, before: Diagnosis, after: Diagno
                 )
             )
     return tuple(entries)
+
+
+def _entry(model: Assembly, change: Change) -> LedgerEntry:
+    return LedgerEntry(
+        change.what,
+        change.rung,
+        tuple(model.parts[face].name for face in change.faces),
+        change.reason,
+        count=len(change.faces),
+        tolerance=change.tolerance,
+        largest_move=change.largest_move,
+        where=_point(change.where),
+    )
 
 
 def _point(where: Array | Point) -> Point:

@@ -14,19 +14,16 @@ import numpy as np
 from patchwright.models.analytic import Plane
 from patchwright.models.arrays import Array
 from patchwright.models.assembly import Assembly, Part
-from patchwright.models.cad import contained
 from patchwright.models.cad.connectivity import is_point
-from patchwright.models.cad.seams import edge_deviation, edge_uses
+from patchwright.models.cad.rebuild import NOTHING, rebuilt
+from patchwright.models.cad.seams import edge_uses
 from patchwright.models.cad.sewing import surface_difference
 from patchwright.models.errors import GeometryError, ParameterError
 from patchwright.models.knots import divided
 from patchwright.models.nurbs_curve import NurbsCurve
 from patchwright.models.topology import EdgeUse, Topology
-from patchwright.models.triangulation import Triangulation
 
-SECONDS, SECONDS_PER_FACE = 120.0, 1.0
 PROBES = 16  # points per span of an edge where its flatness is measured
-_NOTHING = Triangulation(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -125,32 +122,16 @@ def cap(assembly: Assembly, loops: tuple[FreeLoop, ...], flat: float, *, time_li
     for number, group in enumerate(groups):
         plane, uses = _face(topology, [loops[i] for i in group])
         faces = tuple(dict.fromkeys(face for i in group for face in loops[i].faces))
-        parts.append(Part(_name(assembly, number), _NOTHING, plane, body=assembly.parts[faces[0]].body))
+        parts.append(Part(_name(assembly, number), NOTHING, plane, body=assembly.parts[faces[0]].body))
         new_loops.append(uses)
         around.append(faces)
     caps = tuple(range(len(assembly.parts), len(parts)))
     wider = replace(topology, loops=tuple(new_loops), flipped=(*topology.flipped, *(False for _ in caps)))
-    light = tuple(replace(p, triangulation=_NOTHING, trims=None) for p in parts)
-    model = replace(assembly, parts=light, topology=wider, native=None)
-    limit = SECONDS + SECONDS_PER_FACE * len(parts) if time_limit is None else time_limit
-    made: Assembly = contained.call_named(
-        "patchwright.models.cad.capping:build_here", model, edge_deviation(model),
-        time_limit=limit, what=f"building {len(caps)} caps onto {len(assembly.parts)} faces",
-    )  # fmt: skip
+    made = rebuilt(assembly, tuple(parts), wider, time_limit=time_limit)
     change = np.array(
         [surface_difference(a.surface, b.surface) for a, b in zip(assembly.parts, made.parts, strict=False)]
     )
     return Capped(made, caps, tuple(around), change)
-
-
-def build_here(assembly: Assembly, deviation: Array) -> Assembly:
-    """The assembly built by the kernel out of its topology, in this process, with triangles and native handles."""
-    from patchwright.models.cad.reading import assembly_of
-    from patchwright.models.cad.writing import shape_of
-
-    shape, faces = shape_of(assembly, deviation)
-    names, bodies = [p.name for p in assembly.parts], [p.body for p in assembly.parts]
-    return replace(assembly_of(shape, names, bodies, assembly.source, faces=faces), unit=assembly.unit)
 
 
 def reason_against(loop: FreeLoop, flat: float) -> str:

@@ -53,7 +53,7 @@ def test_the_stated_deviation_is_that_from_the_faces(ball, resurfaced):
 
 def test_a_gap_is_refused_and_the_way_out_is_named(tmp_path):
     nets = [part.surface.control_points.copy() for part in cube_sphere().parts]
-    nets[4] *= 1.03  # one face of six lifted off the others
+    nets[4] *= 1.2  # one face of six lifted off the others, farther than a seam that came open
     write(tmp_path / "gap.step", network(nets))
     result = repair(read(tmp_path / "gap.step"))
     assert result.verdict == Verdict.REFUSED

@@ -1,0 +1,91 @@
+"""What the rungs for CAD faces hand to each other: parts, the topology between them, and what was changed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from patchwright.models.arrays import Array
+from patchwright.models.assembly import Assembly, Part
+from patchwright.models.cad.capping import FreeLoop, free_loops
+from patchwright.models.cad.seams import edge_uses
+from patchwright.models.surface import Surface
+from patchwright.models.topology import Topology
+from patchwright.repair.result import Rung
+
+REACH_SHARE = 0.05  # of the diagonal: rims farther apart than this are no seam that came open
+RIM_SHARE = 0.5  # of a rim's own diagonal: a gap as wide as this is an opening
+ON_SHARE = 5e-7  # of the diagonal: an edge this near a surface lies on it; half of the widest seam that is closed
+FIT_SHARE = 1e-10  # of the diagonal: how near new edges and pcurves follow what they stand for
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """The lengths the rungs decide by, in the model's unit."""
+
+    diagonal: float
+    on: float
+    fit: float
+    reach: float
+
+    @classmethod
+    def of(cls, diagonal: float) -> Limits:
+        """The shares above of a diagonal."""
+        return cls(diagonal, ON_SHARE * diagonal, FIT_SHARE * diagonal, REACH_SHARE * diagonal)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Change:
+    """One thing a rung did: to which parts, by how much at most, where, and why it may."""
+
+    what: str
+    rung: Rung
+    faces: tuple[int, ...]
+    reason: str
+    tolerance: float
+    largest_move: float
+    where: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Draft:
+    """Parts with a topology that is being mended; `origin` is each part's input part, -1 for invented ones."""
+
+    assembly: Assembly
+    topology: Topology
+    origin: tuple[int, ...]
+
+    @property
+    def parts(self) -> tuple[Part, ...]:
+        """The parts, in the order of `topology.loops`."""
+        return self.assembly.parts
+
+    def surface(self, face: int) -> Surface:
+        """A part's surface."""
+        surface = self.parts[face].surface
+        assert surface is not None
+        return surface
+
+    def rims(self) -> tuple[FreeLoop, ...]:
+        """Rings and chains of free edges."""
+        return free_loops(replace(self.assembly, topology=self.topology, native=None))
+
+    def owners(self) -> dict[int, int]:
+        """The face of every edge that is used once."""
+        counts = self.topology.use_counts()
+        return {int(e): int(f) for e, f, _, _ in edge_uses(self.topology) if counts[e] == 1}
+
+    def with_surfaces(self, changed: dict[int, Surface], topology: Topology, *, same: bool) -> Draft:
+        """Other surfaces for some parts; `same` says that they differ in their ranges only, so native faces stay."""
+        parts = list(self.parts)
+        for face, surface in changed.items():
+            parts[face] = replace(parts[face], surface=surface, native=parts[face].native if same else None)
+        return replace(self, assembly=replace(self.assembly, parts=tuple(parts)), topology=topology)
+
+
+def apart(points: Array, others: Array) -> Array:
+    """(k,) distance of each point from the nearest of `others`."""
+    from scipy.spatial import cKDTree
+
+    return np.asarray(cKDTree(others).query(points)[0])

@@ -1,0 +1,105 @@
+"""The rungs between sewing and refusal for CAD faces, climbed in order, and the proof that the result holds.
+
+Each rung takes a draft and returns one; nothing is built until all have had their turn. The outcome is then built by
+the CAD kernel and counts only if its seams, measured surface to surface, are closed and no face became invalid.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from patchwright.models.arrays import IntArray
+from patchwright.models.assembly import Assembly
+from patchwright.models.cad.editing import compacted, welded
+from patchwright.models.cad.rebuild import rebuilt
+from patchwright.models.cad.seams import measure_seams
+from patchwright.models.cad.sewing import sew
+from patchwright.models.cad.status import brep_status
+from patchwright.models.errors import EngineError
+from patchwright.repair.cad_draft import Change, Draft, Limits
+from patchwright.repair.loose_seams import opened
+from patchwright.repair.realign import realign
+from patchwright.repair.retrim import retrim
+from patchwright.repair.strip import strip
+
+FOLD = 179.0  # degrees between outward normals: two faces that lie on each other
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Healed:
+    """The mended assembly, the input part of each part (-1: invented), and what was done.
+
+    `opened` counts the shared edges whose surfaces were apart; `free_before` and `free_after` the free edges.
+    """
+
+    assembly: Assembly
+    origin: IntArray
+    changes: tuple[Change, ...]
+    opened: int
+    free_before: int
+    free_after: int
+
+
+def heal(model: Assembly, diagonal: float) -> Healed | None:
+    """A sewn model with its open and loose seams closed as far as the rungs reach; None where nothing was to be done.
+
+    Where the result of all rungs does not hold, the surfaces' crossings are left out; where that does not hold either,
+    None.
+    """
+    topology = model.topology
+    if topology is None:
+        return None
+    limits = Limits.of(diagonal)
+    start = Draft(model, welded(topology, 2.0 * limits.on), tuple(range(len(model.parts))))
+    draft, apart = opened(start, limits)
+    before = _free(draft)
+    if not before:
+        return None
+    for crossing in (True, False):
+        mended, changes = _climbed(draft, limits, crossing)
+        if not changes:
+            return None
+        made = _built(model, mended, limits)
+        if made is not None:
+            free = int((made.topology.use_counts() == 1).sum()) if made.topology else 0
+            return Healed(made, np.array(mended.origin), changes, apart, before, free)
+    return None
+
+
+def _climbed(draft: Draft, limits: Limits, crossing: bool) -> tuple[Draft, tuple[Change, ...]]:
+    """All rungs in order: least change first, and what is certain before what is likely."""
+    draft, changes = retrim(draft, limits, crossing=False)
+    draft, put_back = realign(draft, limits)
+    if put_back:
+        draft = replace(draft, topology=welded(draft.topology, 2.0 * limits.on))
+        draft, again = retrim(draft, limits, crossing=False)
+        joined = {face for change in put_back for face in change.faces}
+        changes = (*changes, *put_back, *(c for c in again if not joined & set(c.faces)))
+    if crossing:
+        draft, crossed = retrim(draft, limits)
+        changes = (*changes, *crossed)
+    draft, moved = strip(draft, limits)
+    changes = (*changes, *moved)
+    return draft, changes
+
+
+def _free(draft: Draft) -> int:
+    return int((draft.topology.use_counts() == 1).sum())
+
+
+def _built(model: Assembly, draft: Draft, limits: Limits) -> Assembly | None:
+    """The draft as the kernel builds it, sewn where edges coincide but are not shared; None where it does not hold."""
+    try:
+        made = rebuilt(model, draft.parts, compacted(draft.topology))
+        if made.topology is not None and (made.topology.use_counts() == 1).any():
+            sewn = sew(made, 2.0 * limits.on)
+            if not sewn.dropped and sewn.surface_change.max(initial=0.0) <= 1e-12 * max(limits.diagonal, 1.0):
+                made = sewn.assembly
+        sound = all(s.gap <= 2.0 * limits.on and s.angle < FOLD for s in measure_seams(made))
+        was = set(brep_status(model).invalid)
+        worse = [i for i in brep_status(made).invalid if i >= len(draft.origin) or draft.origin[i] not in was]
+    except EngineError:
+        return None
+    return made if sound and not worse else None

@@ -1,0 +1,205 @@
+"""The curve in a surface's parameters below a curve in space, with the space curve's own parameter.
+
+Planes carry it exactly, lines on cylinders and cones too. Elsewhere splines of degree 5 interpolate the parameters of
+points of the curve, piece by piece between its corners, and are refined until the surface at the fitted parameters is
+within the accuracy of the curve everywhere between the points. Surfaces of closed form are widened to hold the curve:
+their ranges are trims, not shape.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import cast
+
+import numpy as np
+
+from patchwright.models import Cone, Cylinder, Plane, Sphere, Torus
+from patchwright.models.arrays import Array
+from patchwright.models.knots import distinct, divided
+from patchwright.models.nurbs_curve import NurbsCurve
+from patchwright.models.nurbs_surface import NurbsSurface
+from patchwright.models.surface import Surface
+from patchwright.ssi.closed_forms.inversion import TURN, Analytic, inverted
+
+DEGREE = 5
+FIRST, MOST = 12, 768  # points per piece
+BETWEEN = 4  # probes between two points
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Below:
+    """A pcurve, the surface wide enough for it, and how far the two are from the curve at most."""
+
+    pcurve: NurbsCurve
+    surface: Surface
+    residual: float
+
+
+def below(surface: Surface, curve: NurbsCurve, accuracy: float, near: Array | None = None) -> Below:
+    """The image of a curve on a surface.
+
+    Parameters
+    ----------
+    accuracy : length; the fit is refined until its residual is below it, or as far as it goes
+    near : (2,) parameters the curve's start is to be next to, where the surface is periodic
+
+    The caller judges by `residual`: a curve that is off the surface has its feet's image and its distance.
+    """
+    if isinstance(surface, Plane):
+        flat = (curve.control_points - surface.origin) @ np.stack([surface.xdir, surface.ydir], axis=1)
+        found = NurbsCurve(curve.degree, curve.knots, flat, curve.weights)
+        return _judged(surface, curve, found, divided(curve.breaks, 8))
+    straight = _straight(surface, curve, near, accuracy)
+    if straight is not None:
+        return straight
+    count, last = FIRST, np.inf
+    while True:
+        sites = [_sites(a, b, count) for a, b in _smooth_pieces(curve)]
+        uv = parameters(surface, curve(np.concatenate(sites)), near)
+        splits = np.cumsum([len(s) for s in sites])[:-1]
+        made = joined([spline(t, values) for t, values in zip(sites, np.split(uv, splits), strict=True)])
+        probes = divided(np.unique(np.concatenate(sites)), BETWEEN)
+        result = _judged(surface, curve, made, probes)
+        if result.residual <= accuracy or count >= MOST or result.residual > 0.5 * last:
+            return result  # as near as wanted, or more points do not bring it nearer: the curve is off the surface
+        last, count = result.residual, 2 * count
+
+
+def parameters(surface: Surface, points: Array, near: Array | None = None) -> Array:
+    """(k, 2) parameters of the points' feet, continuous along the row where the surface is periodic."""
+    if isinstance(surface, NurbsSurface):
+        feet = surface.closest(points)
+        return np.stack([feet.u, feet.v], axis=1)
+    uv = inverted(cast(Analytic, surface), points)[0]
+    for k in (0, 1):
+        if _period(surface, k):
+            uv[:, k] = np.unwrap(uv[:, k])
+            if near is not None:
+                uv[:, k] += TURN * np.round((near[k] - uv[0, k]) / TURN)
+    return np.asarray(uv)
+
+
+def widened(surface: Surface, uv: Array) -> Surface:
+    """The surface with ranges that hold all of `uv` (k, 2): a NURBS as it is, any other as wide as needed."""
+    if isinstance(surface, NurbsSurface):
+        return surface
+    low, high = np.array(surface.domain).T
+    lowest, highest = np.minimum(low, uv.min(axis=0)), np.maximum(high, uv.max(axis=0))
+    if (lowest >= low).all() and (highest <= high).all():
+        return surface
+    for k in (0, 1):
+        if _period(surface, k) and highest[k] - lowest[k] > TURN:
+            lowest[k], highest[k] = uv[:, k].min(), max(uv[:, k].min() + TURN, uv[:, k].max())
+            highest[k] = min(highest[k], lowest[k] + TURN)
+    if isinstance(surface, Sphere):
+        lowest[1], highest[1] = max(lowest[1], -np.pi / 2), min(highest[1], np.pi / 2)
+    return with_ranges(surface, (float(lowest[0]), float(highest[0])), (float(lowest[1]), float(highest[1])))
+
+
+def with_ranges(surface: Surface, u: tuple[float, float], v: tuple[float, float]) -> Surface:
+    """A surface of closed form on other ranges."""
+    if isinstance(surface, Plane):
+        return Plane(surface.origin, surface.normal, surface.xdir, u, v)
+    if isinstance(surface, Cylinder):
+        return Cylinder(surface.origin, surface.axis, surface.radius, surface.xdir, u, v)
+    if isinstance(surface, Cone):
+        return Cone(surface.origin, surface.axis, surface.half_angle, surface.ref_radius, surface.xdir, u, v)
+    if isinstance(surface, Sphere):
+        return Sphere(surface.center, surface.radius, axis=surface.axis, xdir=surface.xdir, u=u, v=v)
+    torus = cast(Torus, surface)
+    return Torus(torus.center, torus.axis, torus.major_radius, torus.minor_radius, xdir=torus.xdir, u=u, v=v)
+
+
+def _period(surface: Surface, k: int) -> bool:
+    return isinstance(surface, Torus) or (k == 0 and isinstance(surface, Cylinder | Cone | Sphere))
+
+
+def _straight(surface: Surface, curve: NurbsCurve, near: Array | None, accuracy: float) -> Below | None:
+    """The image where it is a straight line run at even speed: rulings, circles round the axis by their angle."""
+    t0, t1 = curve.domain
+    if isinstance(surface, NurbsSurface):
+        return None
+    t = np.linspace(t0, t1, 33)
+    uv = parameters(surface, curve(t), near)
+    line = uv[0] + ((t - t0) / (t1 - t0))[:, None] * (uv[-1] - uv[0])
+    if np.abs(uv - line).max() > 1e-9 * max(1.0, float(np.abs(uv).max())):
+        return None
+    made = NurbsCurve(1, np.array([t0, t0, t1, t1]), np.stack([uv[0], uv[-1]]))
+    found = _judged(surface, curve, made, divided(curve.breaks, 8))
+    return found if found.residual <= accuracy else None
+
+
+def _judged(surface: Surface, curve: NurbsCurve, pcurve: NurbsCurve, t: Array) -> Below:
+    uv = pcurve(t)
+    wide = widened(surface, np.concatenate([uv, pcurve.control_points]) if not pcurve.rational else uv)
+    low, high = np.array(wide.domain).T
+    inside = np.clip(uv, low, high)
+    off = np.linalg.norm(wide(inside[:, 0], inside[:, 1]) - curve(t), axis=1)
+    return Below(pcurve, wide, float(off.max()))
+
+
+def _smooth_pieces(curve: NurbsCurve) -> list[tuple[float, float]]:
+    """The ranges between the corners a knot of full multiplicity allows."""
+    values, counts = distinct(curve.knots)
+    t0, t1 = curve.domain
+    inner = values[(counts >= curve.degree) & (values > t0) & (values < t1)]
+    ends = [t0, *inner.tolist(), t1]
+    return list(pairwise(ends))
+
+
+def _sites(a: float, b: float, count: int) -> Array:
+    """Sites from a to b, closer together at the ends, where interpolation of high degree needs them."""
+    even = np.linspace(-1.0, 1.0, count)
+    bent = 0.8 * even + 0.2 * np.sin(0.5 * np.pi * even)
+    out = a + (b - a) * 0.5 * (1.0 + bent)
+    out[0], out[-1] = a, b
+    return np.asarray(out)
+
+
+def spline(t: Array, values: Array) -> NurbsCurve:
+    """The spline of degree 5 through values (k, d), k > 5, at sites (k,)."""
+    from scipy.interpolate import make_interp_spline
+
+    made = make_interp_spline(t, values, k=DEGREE)
+    points = np.array(made.c)
+    points[0], points[-1] = values[0], values[-1]
+    return NurbsCurve(DEGREE, made.t, points)
+
+
+def joined(pieces: list[NurbsCurve]) -> NurbsCurve:
+    """Clamped curves of one degree, each starting where the last ends, as one."""
+    p = pieces[0].degree
+    knots, points = pieces[0].knots, pieces[0].control_points
+    for piece in pieces[1:]:
+        knots = np.concatenate([knots[:-1], piece.knots[p + 1 :]])
+        points = np.concatenate([points, piece.control_points[1:]])
+    return NurbsCurve(p, knots, points)
+
+
+def fitted(place: Callable[[Array], Array], like: NurbsCurve, accuracy: float) -> NurbsCurve:
+    """The spline through `place(t)`, (k, d) at parameters (k,), with the range and the corners of the curve `like`."""
+    count, last = FIRST, np.inf
+    while True:
+        sites = [_sites(a, b, count) for a, b in _smooth_pieces(like)]
+        splits = np.cumsum([len(s) for s in sites])[:-1]
+        values = np.split(place(np.concatenate(sites)), splits)
+        line = _line(np.concatenate(sites), np.concatenate(values))
+        if line is not None:
+            return line
+        made = joined([spline(t, some) for t, some in zip(sites, values, strict=True)])
+        probes = divided(np.unique(np.concatenate(sites)), BETWEEN)
+        off = float(np.linalg.norm(made(probes) - place(probes), axis=1).max())
+        if off <= accuracy or count >= MOST or off > 0.5 * last:
+            return made
+        last, count = off, 2 * count
+
+
+def _line(t: Array, values: Array) -> NurbsCurve | None:
+    """The straight curve through the values where they lie on one, run at even speed, to round-off."""
+    share = ((t - t[0]) / (t[-1] - t[0]))[:, None]
+    off = np.abs(values - (1.0 - share) * values[0] - share * values[-1]).max()
+    if off > 64.0 * np.finfo(np.float64).eps * np.abs(values).max():
+        return None
+    return NurbsCurve(1, np.array([t[0], t[0], t[-1], t[-1]]), values[[0, -1]])
