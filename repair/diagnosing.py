@@ -10,6 +10,7 @@ from patchwright.models.assembly import Assembly
 from patchwright.models.errors import ParameterError
 from patchwright.models.tolerance import Tolerance
 from patchwright.models.triangulation import Triangulation
+from patchwright.repair.checks.bare_faces import completed
 from patchwright.repair.checks.examination import Examination
 from patchwright.repair.checks.registry import checks
 from patchwright.repair.diagnosis import KINDS, Defect, Diagnosis
@@ -54,6 +55,7 @@ def diagnose(
         raise ParameterError(
             f"{model.source or 'the assembly'} holds no triangles and no faces: there is nothing to diagnose"
         )
+    model = completed(model)
     around = surroundings(model, domain)
     limits = tolerance if isinstance(tolerance, Tolerance) else Tolerance.of(around.body_size(model), fit=tolerance)
     exam = Examination(model, limits, around)

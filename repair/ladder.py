@@ -9,6 +9,7 @@ from patchwright.models.assembly import Assembly
 from patchwright.models.errors import ParameterError
 from patchwright.models.tolerance import Tolerance
 from patchwright.models.triangulation import Triangulation
+from patchwright.repair.checks.bare_faces import tessellated
 from patchwright.repair.decisions import Decisions
 from patchwright.repair.diagnosis import Diagnosis
 from patchwright.repair.domain import Domain
@@ -147,6 +148,7 @@ def _task(
     if not isinstance(domain, Domain | None):
         raise ParameterError(f"domain must be a Domain or None, got {type(domain).__name__}")
     model = Assembly.of(assembly) if isinstance(assembly, Triangulation) else assembly
+    model = tessellated(model)
     if not any(len(part.triangulation) for part in model.parts):
         raise ParameterError(
             f"{model.source or 'the assembly'} holds no triangles and no faces: there is nothing to repair"

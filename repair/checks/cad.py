@@ -164,11 +164,49 @@ def _tolerances(exam: Examination) -> tuple[list[Defect], dict[str, Any]]:
         )
 
     defects = _edge_regions(exam, "loose-tolerance", "warning", loose, say)
-    return defects, {"largest_edge_tolerance": float(native.max()), "loose_edges": len(loose)}
+    vertices, figures = _vertex_tolerances(exam, loose)
+    edges = {
+        "largest_edge_tolerance": float(native.max()),
+        "largest_edge_tolerance_share": float(native.max()) / max(exam.diagonal, np.finfo(float).tiny),
+        "loose_edges": len(loose),
+    }
+    return [*defects, *vertices], edges | figures
 
 
-def _invalid_faces(exam: Examination) -> tuple[list[int] | None, str]:
-    """Faces the kernel's own check calls invalid; None and the reason when it gives no answer."""
+def _vertex_tolerances(exam: Examination, loose: IntArray) -> tuple[list[Defect], dict[str, Any]]:
+    """Vertices whose kernel tolerance is larger than round-off and that end no loose edge, which is told already."""
+    from patchwright.models.cad.contained import call_named
+
+    topology = exam.assembly.topology
+    assert topology is not None
+    try:
+        rows: Array = call_named(
+            "patchwright.repair.checks.cad_validity:vertex_tolerances", exam.assembly.native,
+            time_limit=KERNEL_SECONDS, what="reading the vertices",
+        )  # fmt: skip
+    except EngineError:
+        return [], {}
+    if not len(rows):
+        return [], {}
+    told = topology.vertices[np.unique(topology.ends[loose])]
+    near = np.zeros(len(rows), dtype=np.bool_)
+    if len(told):
+        from scipy.spatial import cKDTree
+
+        near = cKDTree(told).query(rows[:, :3])[0] <= rows[:, 3]
+    some = np.flatnonzero((rows[:, 3] > exam.tolerance.gap) & ~near)
+    figures = {"largest_vertex_tolerance": float(rows[:, 3].max()), "loose_vertices": len(some)}
+    if not len(some):
+        return [], figures
+    box = box_of(rows[some, :3])
+    size = float(np.linalg.norm(box[1] - box[0]))
+    most = exam.length(float(rows[some, 3].max()))
+    message = f"{plural(len(some), 'corner')} with a tolerance up to {most} at edges without one"
+    return [Defect("loose-tolerance", "warning", box.mean(axis=0), size, (), len(some), message, box)], figures
+
+
+def _invalid_faces(exam: Examination) -> tuple[list[tuple[int, str]] | None, str]:
+    """Faces the kernel's own check calls invalid and why; None and the reason when it gives no answer."""
     from patchwright.models.cad.contained import call_named
 
     if exam.assembly.native is None:
@@ -180,12 +218,12 @@ def _invalid_faces(exam: Examination) -> tuple[list[int] | None, str]:
         )  # fmt: skip
     except EngineError as error:
         return None, str(error)
-    return [int(i) for i in found], "checked by the CAD kernel"
+    return [(int(i), str(why)) for i, why in found], "checked by the CAD kernel"
 
 
-def _face_defects(exam: Examination, invalid: list[int] | None) -> list[Defect]:
+def _face_defects(exam: Examination, invalid: list[tuple[int, str]] | None) -> list[Defect]:
     defects = []
-    for face in invalid or ():
+    for face, why in invalid or ():
         part = exam.assembly.parts[face]
         if not len(part.triangulation):
             corners = _ends_and_middle(
@@ -196,7 +234,7 @@ def _face_defects(exam: Examination, invalid: list[int] | None) -> list[Defect]:
         box = box_of(corners)
         size = float(np.linalg.norm(box[1] - box[0]))
         name = part.name or f"face {face + 1}"
-        message = f"the CAD kernel calls {name} (face {face + 1}) invalid; it is {exam.length(size)} large"
+        message = f"the CAD kernel calls {name} (face {face + 1}) invalid ({why}); it is {exam.length(size)} large"
         defects.append(Defect("invalid-face", "error", box.mean(axis=0), size, (part.name,), 1, message, box))
     return defects
 

@@ -197,6 +197,13 @@ class Examination:
         return crossing_pairs(self.body, self.tolerance.gap)
 
     @cached_property
+    def tessellation_crossings(self) -> IntArray:
+        """(k, 2) pairs of triangles of `merged` that pass through each other."""
+        from patchwright.repair.crossings import crossing_pairs
+
+        return crossing_pairs(self.merged, self.tolerance.gap)
+
+    @cached_property
     def junctions(self) -> IntArray:
         """(k, 3) vertex, triangle of `oriented` and its edge 0..2 the vertex lies on, along the rims."""
         from patchwright.repair.checks.junctions import find_junctions

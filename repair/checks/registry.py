@@ -47,6 +47,7 @@ _MODULES = (
     "domain",
     "cad",
     "cad_rims",
+    "cad_crossings",
     "parametrisation",
 )
 

@@ -1,0 +1,160 @@
+"""CAD faces that pass through each other or themselves, and faces that fold back: found on the tessellation.
+
+Two faces cross when their triangles do so deeper somewhere than the tessellation strays from the true surfaces: chords
+of curved faces that merely meet are no crossings, and crossings that are shallow all along are not seen.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from patchwright.models.adjacency import Adjacency
+from patchwright.models.arrays import Array, BoolArray, IntArray
+from patchwright.models.assembly import Part
+from patchwright.models.triangulation import Triangulation
+from patchwright.repair.checks.crossing_curves import crossing_curves, total_length
+from patchwright.repair.checks.examination import Examination, box_of
+from patchwright.repair.checks.regions import plural
+from patchwright.repair.checks.registry import Finding, check
+from patchwright.repair.diagnosis import Defect
+
+SURE = 3.0  # times the sag of both faces' triangles: deeper is a crossing of the surfaces themselves
+STEPS = 65  # places between two triangles where the true normal is looked at
+ROUND = -0.9  # cosine: between two such places it turns round
+VANISHING = 0.1  # of its usual length
+FOLD = -0.5  # cosine: neighbouring triangles of one face that turn by more than 120 degrees
+
+
+@check("cad-crossings", looks="cad", kinds=("self-intersection", "overlap", "parametrisation"))
+def cad_crossings(exam: Examination) -> Finding:
+    """Bodies that overlap, faces of one body that cross, faces that cross or fold over themselves."""
+    mesh, faces = exam.merged, exam.raw.tags
+    if faces is None or len(mesh) < 2:
+        return Finding()
+    sag = _sag(exam)
+    pairs = exam.tessellation_crossings
+    key = np.sort(faces[pairs], axis=1)
+    deep = _depth(mesh, pairs) > SURE * sag[key].sum(axis=1) + exam.tolerance.gap
+    which = np.unique(key, axis=0, return_inverse=True)[1].reshape(-1)
+    real = np.bincount(which, weights=deep)[which] > 0
+    pairs, key = pairs[real], key[real]
+    body = _bodies(exam)
+    over = body[key[:, 0]] != body[key[:, 1]]
+    defects = [
+        *_crossing(exam, mesh, pairs[over], np.sort(body[faces[pairs[over]]], axis=1), "overlap"),
+        *_crossing(exam, mesh, pairs[~over], key[~over], "self-intersection"),
+        *_folds(exam, faces),
+    ]
+    return Finding(tuple(defects), {"crossing_faces": len(np.unique(key)), "largest_sag": float(sag.max(initial=0.0))})
+
+
+def _sag(exam: Examination) -> Array:
+    """(f,) how far the middles of each face's triangles stray from its surface at the middle of their parameters."""
+    out = np.zeros(len(exam.assembly.parts))
+    for i, part in enumerate(exam.assembly.parts):
+        mesh = part.triangulation
+        if part.surface is not None and mesh.uv is not None and len(mesh):
+            u, v = mesh.uv.mean(axis=1).T
+            off = np.linalg.norm(part.surface(u, v) - mesh.corners.mean(axis=1), axis=1)
+            out[i] = float(np.percentile(off, 99.0))
+    return out
+
+
+def _depth(mesh: Triangulation, pairs: IntArray) -> Array:
+    """(k,) how far the corners of one triangle of a pair reach to both sides of the other's plane, the larger way."""
+    corners, normals = mesh.corners, mesh.normals
+    depth = np.zeros(len(pairs))
+    for one, other in ((0, 1), (1, 0)):
+        a, b = pairs[:, one], pairs[:, other]
+        height = np.einsum("kcj,kj->kc", corners[b] - corners[a][:, :1], normals[a])
+        depth = np.maximum(depth, np.minimum(height.max(axis=1), -height.min(axis=1)))
+    return depth
+
+
+def _bodies(exam: Examination) -> IntArray:
+    """(f,) label of the body of each face: faces connected by edges, or by the file's own bodies."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    parts, topology = exam.assembly.parts, exam.assembly.topology
+    names = {part.body: i for i, part in enumerate(parts) if part.body}
+    rows = [(i, len(parts) + names[part.body]) for i, part in enumerate(parts) if part.body]
+    for face, loops in enumerate(topology.loops if topology else ()):
+        rows += [(face, 2 * len(parts) + use.edge) for loop in loops for use in loop]
+    size = 2 * len(parts) + (len(topology.curves) if topology else 0)
+    i, j = np.array(rows, dtype=np.int64).reshape(-1, 2).T
+    graph = coo_array((np.ones(len(i), dtype=np.int8), (i, j)), shape=(size, size))
+    return connected_components(graph, directed=False)[1][: len(parts)].astype(np.int64)
+
+
+def _crossing(exam: Examination, mesh: Triangulation, pairs: IntArray, key: IntArray, kind: str) -> list[Defect]:
+    """One defect per pair of bodies or faces, with the curves they cross in."""
+    if not len(pairs):
+        return []
+    which = np.unique(key, axis=0, return_inverse=True)[1].reshape(-1)
+    curves = crossing_curves(mesh, pairs, which)
+    found = []
+    for k in range(int(which.max()) + 1):
+        triangles = np.unique(pairs[which == k])
+        box = box_of(mesh.corners[triangles])
+        size = float(np.linalg.norm(box[1] - box[0]))
+        parts = exam.parts_of(triangles)
+        faces = len(np.unique(exam.raw.tags[triangles])) if exam.raw.tags is not None else 1
+        what = (
+            "bodies overlap" if kind == "overlap" else "a face passes through itself" if faces == 1 else "faces cross"
+        )
+        message = (
+            f"{what}: {', '.join(parts[:4])}, along {plural(len(curves[k]), 'curve')}, "
+            f"{exam.length(total_length(curves[k]))} long"
+        )
+        found.append(Defect(kind, "error", box.mean(axis=0), size, parts, faces, message, box, curves=curves[k]))
+    return found
+
+
+def _folds(exam: Examination, faces: IntArray) -> list[Defect]:
+    """Faces whose triangles turn back on their neighbours: the surface folds over itself within its parameters."""
+    adjacency = Adjacency.of(exam.merged.take(exam.merged_index))
+    normals, face = exam.merged.normals[exam.merged_index], faces[exam.merged_index]
+    neighbours = adjacency.neighbours
+    i, k = np.nonzero(neighbours >= 0)
+    j = neighbours[i, k]
+    turn = np.einsum("ij,ij->i", normals[i], normals[j])
+    back: BoolArray = (turn < FOLD) & (face[i] == face[j]) & normals[i].any(axis=1) & normals[j].any(axis=1)
+    found = []
+    for one in np.unique(face[i[back]]):
+        part = exam.assembly.parts[int(one)]
+        own = np.flatnonzero(back & (face[i] == one))
+        start = int(np.searchsorted(faces, one))
+        local = exam.merged_index[np.stack([i[own], j[own]], axis=1)] - start
+        own = own[_folded(part, local)]
+        if not len(own):
+            continue
+        triangles = np.unique(exam.merged_index[i[own]])
+        box = box_of(exam.merged.corners[triangles])
+        size = float(np.linalg.norm(box[1] - box[0]))
+        name = part.name or f"face {int(one) + 1}"
+        message = f"{name} (face {int(one) + 1}) folds back over itself along {exam.length(size)}"
+        found.append(
+            Defect("parametrisation", "error", box.mean(axis=0), size, (part.name,), len(triangles), message, box)
+        )
+    return found
+
+
+def _folded(part: Part, pairs: IntArray) -> BoolArray:
+    """(k,) pairs of a face's triangles between which its normal turns round at one place where it vanishes.
+
+    That is a fold. A narrow bend turns it gradually, a sharp edge without making it vanish.
+    """
+    uv = part.triangulation.uv
+    if part.surface is None or uv is None:
+        return np.zeros(len(pairs), dtype=np.bool_)
+    middle = uv.mean(axis=1)
+    share = np.linspace(0.0, 1.0, STEPS)[None, :, None]
+    way = middle[pairs[:, :1]] * (1.0 - share) + middle[pairs[:, 1:]] * share
+    u, v = way[..., 0], way[..., 1]
+    normal = np.cross(part.surface(u, v, (1, 0)), part.surface(u, v, (0, 1)))
+    size = np.linalg.norm(normal, axis=2)
+    unit = normal / np.maximum(size, np.finfo(float).tiny)[..., None]
+    flips = np.einsum("ksj,ksj->ks", unit[:, 1:], unit[:, :-1]) < ROUND
+    vanishing = np.minimum(size[:, 1:], size[:, :-1]) < VANISHING * np.median(size, axis=1)[:, None]
+    return np.asarray((flips & vanishing).any(axis=1))
