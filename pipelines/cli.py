@@ -207,13 +207,14 @@ def intersect(
         Path | None, typer.Option("-o", "--output", help="Curves: .step .igs .vtp .vtk .p3d, or the report as .json.")
     ] = None,
     tolerance: Annotated[float | None, typer.Option(help="Length in model units [1e-10 of the size].")] = None,
+    unit: Annotated[str | None, typer.Option(help="Unit of the files that store none [that of the others].")] = None,
     json: Json = False,
     quiet: Quiet = False,
 ) -> None:
     """Find every curve and point that surfaces, meshes and assemblies share; exit code 1 when any place stays open."""
     from patchwright.pipelines.intersect import run_intersect, sections_json, sections_lines
 
-    result = run_intersect(files, output, tolerance=tolerance, terminal=_terminal(quiet))
+    result = run_intersect(files, output, tolerance=tolerance, terminal=_terminal(quiet), unit=unit)
     names = [str(f) for f in files]
     if json:
         _say_json(sections_json(result, names))

@@ -5,17 +5,18 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from patchwright.models.analytic import Torus
+from patchwright.models.analytic import Plane, Torus
 from patchwright.models.arrays import Array
 from patchwright.models.assembly import Assembly
+from patchwright.models.errors import CorruptFile, ParameterError
 from patchwright.models.io import read, read_grid
-from patchwright.models.io.curves import write_curves
+from patchwright.models.io.curves import curve_format, write_curves
 from patchwright.models.io.registry import format_of
 from patchwright.models.knots import between, divided
 from patchwright.models.nurbs_surface import NurbsSurface
@@ -24,8 +25,11 @@ from patchwright.models.surface import Surface
 from patchwright.models.triangulation import Triangulation
 from patchwright.pipelines.progress import Terminal
 from patchwright.pipelines.scenes import Scene, draw_scenes
-from patchwright.pipelines.warm import announce_sections
+from patchwright.pipelines.units import in_one_unit
+from patchwright.pipelines.warm import MESH_SECTIONS, announce_sections
 from patchwright.ssi import Intersection, IntersectionCurve, intersect
+from patchwright.ssi.intersect import check_tolerance
+from patchwright.ssi.intersection import Box
 from patchwright.ssi.operands import Operand, operands
 
 CHORDS = 16  # of a polyline in each knot span of a curve
@@ -34,16 +38,22 @@ PER_SPAN = 40  # samples of the reported residual: ten times the four a fit of d
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sections:
-    """An intersection with the operands it is between, the time it took, and where it was written."""
+    """An intersection with the operands it is between, the time it took, where it was written, and what was assumed."""
 
     found: Intersection
     items: tuple[Operand, ...]
     seconds: float
     files: tuple[str, ...]
+    notes: tuple[str, ...] = ()
 
 
 def run_intersect(
-    sources: Sequence[Path], output: Path | None, *, tolerance: float | None, terminal: Terminal
+    sources: Sequence[Path],
+    output: Path | None,
+    *,
+    tolerance: float | None,
+    terminal: Terminal,
+    unit: str | None = None,
 ) -> Sections:
     """Read, intersect, and write curves, report and picture where an output is named.
 
@@ -51,31 +61,47 @@ def run_intersect(
     ----------
     sources : files; one alone is intersected with itself
     output : curves as .step, .igs, .vtp, .vtk, .p3d, or .json (the report itself)
+    unit : of the files that store none
     """
     if output is not None and output.suffix.lower() != ".json":
-        format_of(output)
-    inputs: list[Assembly | StructuredGrid] = []
+        curve_format(output)
+    check_tolerance(tolerance)
+    for path in sources:  # before minutes go into reading the others
+        if not path.exists():
+            raise CorruptFile(f"{path}: there is no such file; check the path")
+    read_in: list[Assembly | StructuredGrid] = []
     with terminal.stage("read") as report:
         for k, path in enumerate(sources):
             report(f"reading {path.name}", k / len(sources))
-            inputs.append(_input(path))
-    unit = next((i.unit for i in inputs if isinstance(i, Assembly) and i.unit != "unknown"), "unknown")
+            read_in.append(_input(path))
+    inputs, common, notes = in_one_unit(read_in, [path.name for path in sources], unit)
     items = operands(inputs)
-    if any(isinstance(item.thing, NurbsSurface | Torus) for item in items):
+    things = [item.thing for item in items]
+    meshes = [isinstance(thing, Triangulation) for thing in things]
+    if any(isinstance(thing, NurbsSurface | Torus) for thing in things) and not all(meshes):
         announce_sections(terminal)
+    if any(meshes) and not all(isinstance(thing, Triangulation | Plane) for thing in things):
+        announce_sections(terminal, MESH_SECTIONS)
     begin = time.perf_counter()
     with terminal.stage("intersect") as report:
         found = intersect(inputs[0], *inputs[1:], tolerance=tolerance, progress=report)
-    result = Sections(found, items, time.perf_counter() - begin, ())
+    result = Sections(found, items, time.perf_counter() - begin, (), notes)
     if output is None:
         return result
     with terminal.stage("write") as report:
-        files = _written(result, output, sources, unit, report)
-    return Sections(found, result.items, result.seconds, files)
+        files = _written(result, output, sources, common, report)
+    return replace(result, files=files)
 
 
 def _input(path: Path) -> Assembly | StructuredGrid:
-    return read_grid(path) if "grid" in format_of(path).holds and format_of(path).name == "Plot3D" else read(path)
+    if format_of(path).name != "Plot3D":
+        return read(path)
+    grid = read_grid(path)
+    for number, block in enumerate(grid.blocks):
+        if sum(size > 1 for size in block.shape[:3]) != 2:
+            shape = block.shape[:3]
+            raise ParameterError(f"{path}: block {number} of {shape} nodes is not a surface; give a volume's faces")
+    return grid
 
 
 def _written(result: Sections, output: Path, sources: Sequence[Path], unit: str, report: Any) -> tuple[str, ...]:
@@ -173,9 +199,10 @@ def sections_json(result: Sections, sources: Sequence[str]) -> dict[str, Any]:
             {"area": o.area, "boundary curves": len(o.boundary), "surfaces": names(o.surfaces)} for o in found.overlaps
         ],
         "unresolved": [
-            {"box_a": u.box_a, "box_b": u.box_b, "reason": u.reason, "surfaces": names(u.surfaces)}
+            {"box_a": _finite(u.box_a), "box_b": _finite(u.box_b), "reason": u.reason, "surfaces": names(u.surfaces)}
             for u in found.unresolved
         ],
+        "notes": list(result.notes),
         "seconds": round(result.seconds, 3),
         "files": list(result.files),
     }
@@ -189,26 +216,62 @@ def sections_lines(result: Sections, sources: Sequence[str], most: int = 20) -> 
         f"{' x '.join(sources)}: {len(found.curves)} curves, {len(found.points)} points, "
         f"{len(found.overlaps)} overlaps; {told} ({result.seconds:.2f} s)"
     ]
+    lines += [f"  note: {note}" for note in result.notes]
     for c in found.curves[:most]:
         ends = "closed" if c.closed else "open"
         lines.append(
             f"  {c.kind:<16} {ends:<6} length {c.curve.length():.9g}  residual {c.residual:.2g}  {len(c.points)} points"
+            + _between(result, sources, c.surfaces)
         )
     if len(found.curves) > most:
         lines.append(f"  and {len(found.curves) - most} more; --json lists all")
     for p in found.points[:most]:
         x, y, z = p.point
-        lines.append(f"  {p.kind:<16} at ({x:.9g}, {y:.9g}, {z:.9g})  gap {p.gap:.2g}")
+        lines.append(
+            f"  {p.kind:<16} at ({x:.9g}, {y:.9g}, {z:.9g})  gap {p.gap:.2g}" + _between(result, sources, p.surfaces)
+        )
+    if len(found.points) > most:
+        lines.append(f"  and {len(found.points) - most} more points; --json lists all")
+    for o in found.overlaps[:most]:
+        lines.append(
+            f"  overlap          area {o.area:.9g}  {len(o.boundary)} boundary curves"
+            + _between(result, sources, o.surfaces)
+        )
     for u in found.unresolved[:most]:
-        lines.append(f"  unresolved in {u.box_a} x {u.box_b}: {u.reason}")
+        where = _between(result, sources, u.surfaces)
+        lines.append(f"  unresolved in {_ranges(u.box_a)} x {_ranges(u.box_b)}{where}: {u.reason}")
+    if len(found.unresolved) > most:
+        lines.append(f"  and {len(found.unresolved) - most} more unresolved; --json lists all")
     if result.files:
         lines.append(f"  wrote {', '.join(result.files)}")
     return lines
 
 
+def _between(result: Sections, sources: Sequence[str], which: Sequence[int]) -> str:
+    """Which inputs, where there are more than two."""
+    if len(result.items) < 3:
+        return ""
+    return "  of " + " x ".join(_name(result, sources, i) for i in which)
+
+
+def _name(result: Sections, sources: Sequence[str], which: int) -> str:
+    """A file, and the part of it where it has a name."""
+    item = result.items[which]
+    return f"{Path(sources[item.source]).name}:{item.name}".rstrip(":")
+
+
+def _finite(box: Box) -> list[list[float | None]]:
+    """A box for JSON, which has no infinity: null where it is unbounded."""
+    return [[x if np.isfinite(x) else None for x in side] for side in box]
+
+
+def _ranges(box: Box) -> str:
+    return " ".join(f"[{low:.6g}, {high:.6g}]" for low, high in box)
+
+
 def _scene(result: Sections, path: Path) -> Scene:
     """The inputs in grey, the curves red, single points dark."""
-    bodies = [_drawn(item) for item in result.items]
+    bodies = [_drawn(item) for item in result.items if np.isfinite(item.size)]
     low = np.min([b.bounds[0] for b in bodies], axis=0)
     high = np.max([b.bounds[1] for b in bodies], axis=0)
     scene = Scene(path, f"{len(result.found.curves)} intersection curves", np.stack([low, high]))

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 WITNESS = "patchwright.repair._remesh_kernel"  # compiled late in every repair of a triangulation
 SECTIONS = "patchwright.ssi._subdivision_kernel"  # compiled by every intersection of free-form surfaces
+MESH_SECTIONS = "patchwright.ssi._mesh_surface_kernel"  # by every intersection of a mesh with a curved surface
 _started = False  # in this process
 
 
@@ -51,11 +52,12 @@ def start(terminal: Terminal) -> None:
     subprocess.Popen(command, stdin=nothing, stdout=nothing, stderr=nothing)
 
 
-def announce_sections(terminal: Terminal) -> None:
-    """On a cold machine: say that intersecting surfaces compiles its kernels first."""
-    if is_cold(SECTIONS):
+def announce_sections(terminal: Terminal, witness: str = SECTIONS) -> None:
+    """On a cold machine: say that intersecting surfaces, or meshes with them, compiles its kernels first."""
+    if is_cold(witness):
         spare_collections()
-        terminal.line("  compiling kernels for this machine: one to two minutes for surfaces, this once")
+        how = "one to two minutes for surfaces" if witness == SECTIONS else "about a minute for meshes with surfaces"
+        terminal.line(f"  compiling kernels for this machine: {how}, this once")
 
 
 def spare_collections() -> None:

@@ -54,8 +54,7 @@ def intersect(
     ParameterError : an input of another kind or without triangles, a tolerance that is not a positive length, two
         unbounded surfaces with an unbounded intersection.
     """
-    if tolerance is not None and not (np.isfinite(tolerance) and tolerance > 0.0):
-        raise ParameterError(f"the tolerance must be a positive length, got {tolerance}")
+    check_tolerance(tolerance)
     say = progress or (lambda label, share: None)
     alone = b is None
     items = operands([a] if b is None else [a, b, *others])
@@ -81,6 +80,12 @@ def intersect(
     say("points where three meet", 0.9)
     reach = max(widest, 2.0 * merged.residual)
     return replace(merged, points=merged.points + triple_points(merged.curves, reach))
+
+
+def check_tolerance(tolerance: float | None) -> None:
+    """Raises ParameterError for one that is neither None nor a positive length."""
+    if tolerance is not None and not (np.isfinite(tolerance) and tolerance > 0.0):
+        raise ParameterError(f"the tolerance must be a positive length, got {tolerance}")
 
 
 def _tolerance(a: Operand, b: Operand, given: float | None) -> float:

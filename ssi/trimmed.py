@@ -23,7 +23,6 @@ from patchwright.ssi.operands import Loops
 
 PER_SPAN = 24  # chords of a polyline in each knot span
 NEWTON = 12
-EVERYWHERE: Box = ((-np.inf, np.inf), (-np.inf, np.inf))
 ON = 1e-8  # of the loops' extent in space: what is nearer than this to a loop lies on it
 
 
@@ -42,9 +41,8 @@ def trimmed(found: Intersection, surface: Surface, loops: Loops | None, side: in
     points = tuple(p for p in found.points if _keeps(p, surface, moved, side))
     inside = [_holds(overlap, surface, moved, side) for overlap in found.overlaps]
     overlaps = tuple(o for o, state in zip(found.overlaps, inside, strict=True) if state)
-    boxes = (surface.domain, EVERYWHERE) if side == 0 else (EVERYWHERE, surface.domain)
     open_ = tuple(
-        Unresolved(*boxes, "an overlap is not cut back to the face's trims", o.surfaces)
+        Unresolved(_range(o, 0), _range(o, 1), "an overlap is not cut back to the face's trims", o.surfaces)
         for o, state in zip(found.overlaps, inside, strict=True)
         if state is None
     )
@@ -57,6 +55,14 @@ Moved = Sequence[Sequence[Sequence[NurbsCurve]]]  # loops of curves, once for ev
 def _keeps(contact: Contact, surface: Surface, moved: Moved, side: int) -> bool:
     uv = contact.uv_a if side == 0 else contact.uv_b
     return uv is None or bool(_inside(np.array([uv]), surface, moved)[0])
+
+
+def _range(overlap: Overlap, side: int) -> Box:
+    """The parameters of an overlap's boundary, zeros on a mesh."""
+    images = [c.uv_a if side == 0 else c.uv_b for c in overlap.boundary]
+    net = np.concatenate([uv.control_points for uv in images if uv is not None] or [np.zeros((1, 2))])
+    (u0, v0), (u1, v1) = net.min(axis=0).tolist(), net.max(axis=0).tolist()
+    return (u0, u1), (v0, v1)
 
 
 def _holds(overlap: Overlap, surface: Surface, moved: Moved, side: int) -> bool | None:

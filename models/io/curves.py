@@ -18,7 +18,26 @@ from patchwright.models.nurbs_curve import NurbsCurve
 from patchwright.models.structured_grid import StructuredGrid
 
 SECONDS, SECONDS_PER_CURVE = 120.0, 0.1  # time limit of the CAD kernel
-KNOWN = "STEP, IGES, VTK (.vtp) and Plot3D"
+KNOWN = "STEP (.step), IGES (.igs), VTK (.vtp, .vtk) and Plot3D (.p3d)"
+
+
+def curve_format(path: str | PathLike[str]) -> str:
+    """The name of the format a suffix picks for curves.
+
+    Raises
+    ------
+    UnsupportedFormat : there is none, or it holds no curves.
+    """
+    place = Path(path)
+    if place.suffix.lower() == ".vtk":
+        return "VTK"
+    try:
+        name = format_of(place).name
+    except UnsupportedFormat as error:
+        raise UnsupportedFormat(f"{place}: no known format; known for curves are {KNOWN}") from error
+    if name not in ("STEP", "IGES", "Plot3D") and place.suffix.lower() != ".vtp":
+        raise UnsupportedFormat(f"{place}: {name} files hold no curves; known for curves are {KNOWN}")
+    return name
 
 
 def write_curves(
@@ -42,21 +61,19 @@ def write_curves(
     EngineError : the CAD kernel refused a curve.
     """
     place = Path(path)
-    name = "VTK" if place.suffix.lower() == ".vtk" else format_of(place).name
+    name = curve_format(place)
     if not curves:
         raise UnsupportedFormat(f"{place}: there is no curve to write")
     if name in ("STEP", "IGES"):
         _write_cad(place, name, curves, "mm" if unit == "unknown" else unit)
-    elif name == "VTK" and place.suffix.lower() == ".vtp":
+    elif place.suffix.lower() == ".vtp":
         _write_vtp(place, polylines)
-    elif name == "VTK" and place.suffix.lower() == ".vtk":
+    elif place.suffix.lower() == ".vtk":
         _write_vtk(place, polylines)
-    elif name == "Plot3D":
+    else:
         from patchwright.models.io.plot3d import write
 
         write(place, StructuredGrid(tuple(p.reshape(-1, 1, 1, 3) for p in polylines)))
-    else:
-        raise UnsupportedFormat(f"{place}: {name} files hold no curves; known for curves are {KNOWN}")
 
 
 def _write_cad(path: Path, kind: str, curves: Sequence[NurbsCurve], unit: str) -> None:
