@@ -89,7 +89,7 @@ def _all(curves: Sequence[IntersectionCurve]) -> IntersectionCurve:
 def _leaves(curve: IntersectionCurve, end: int) -> Array:
     """(3,) unit tangent at an end, pointing out of the curve."""
     d = curve.curve(curve.curve.domain[end], nu=1) * (1.0 if end else -1.0)
-    return np.asarray(d / np.linalg.norm(d))
+    return np.asarray(d / max(float(np.linalg.norm(d)), np.finfo(np.float64).tiny))  # at a pinch point it is zero
 
 
 def reversed_curve(curve: IntersectionCurve) -> IntersectionCurve:

@@ -34,7 +34,8 @@ def subdivided(charts: tuple[Chart, Chart], pairs: Pairs, tol: float) -> tuple[A
     matrices = [widening(d - 1) for side in sides for d in side[0].shape[1:3]]
     rational = charts[0].pieces.rational or charts[1].pieces.rational
     out, spent, left, singular = [np.empty((0, ROW))], 0, 0, 0
-    order = meet[np.lexsort((*pairs.p[meet].T, pairs.kp[meet]))]
+    large = np.round(np.log2(np.prod(a[2][meet], axis=1)))  # large boxes first: what is small may use up the budget
+    order = meet[np.lexsort((*pairs.p[meet].T, pairs.kp[meet], -large))]
     same = (np.diff(pairs.kp[order]) == 0) & (np.diff(pairs.p[order], axis=0) == 0.0).all(axis=1)
     for group in np.split(order, np.flatnonzero(~same) + 1):
         if not group.size:

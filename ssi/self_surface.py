@@ -16,16 +16,18 @@ from patchwright.models.errors import ParameterError
 from patchwright.models.nurbs_surface import NurbsSurface
 from patchwright.models.surface import Surface
 from patchwright.ssi.bezier_pieces import Frame
-from patchwright.ssi.chart import Chart
+from patchwright.ssi.chart import Chart, local, restricted
 from patchwright.ssi.intersection import Intersection, Unresolved
 from patchwright.ssi.neighbours import TOUCH, Pairs, apart_at_pole, apart_on, told_apart, touching
 from patchwright.ssi.pair_findings import subdivided
-from patchwright.ssi.singular_points import grouped
+from patchwright.ssi.pinch import ball_of, metric_of, one_curve, pinches
+from patchwright.ssi.singular_points import Ball, grouped
 from patchwright.ssi.surface_surface import assembled
 
 SPANS = 4  # at least so many in a closed direction: then pieces touch in one way only
+NEAR = 8.0  # sizes of an undecided box within which curves are taken to run into it
 LEAST = 1e-4  # of a piece: neighbours are not split below
-NEIGHBOURS = 10_000  # pairs of neighbours tested beyond four for each pair of pieces
+NEIGHBOURS = 4_000  # pairs of neighbours tested beyond four for each pair of pieces
 
 
 def intersect_itself(surface: Surface, tolerance: float) -> Intersection:
@@ -48,12 +50,19 @@ def intersect_itself(surface: Surface, tolerance: float) -> Intersection:
     tol = max(tolerance / frame.size, 2e-14)
     near, far = _pairs(chart, tol)
     slack = TOUCH * np.array([np.ptp(t) for t in chart.breaks])
+    metric = metric_of(chart)
+    ends: list[Pairs] = []
 
     def explained(pairs: Pairs) -> BoolArray:
         close = touching(pairs, slack)
         out = np.zeros(len(pairs), dtype=bool)
         out[close] = apart_on(chart, pairs.where(close))
         out[~close] = apart_at_pole(chart, pairs.where(~close))
+        doubt = np.flatnonzero(close & ~out)
+        if doubt.size:
+            curved = one_curve(chart, pairs.where(doubt), metric)
+            out[doubt] = curved
+            ends.append(pairs.where(doubt[curved]))
         return out
 
     def stays(pairs: Pairs) -> BoolArray:
@@ -62,10 +71,40 @@ def intersect_itself(surface: Surface, tolerance: float) -> Intersection:
     apart, stuck = told_apart(near, explained, stays, LEAST, NEIGHBOURS + 4 * len(near))
     findings = subdivided((chart, chart), Pairs.together([far, apart]), tol)
     two = (chart.pieces, chart.pieces)
-    found = assembled((surface, surface), (native, native), two, frame, tol, findings, alone=True)
+    pinched = [ball_of(x) for x in pinches(chart, Pairs.together(ends), metric)] if ends else []
+    pinched += _barriers(stuck, findings[0], chart)
+    found = assembled((surface, surface), (native, native), two, frame, tol, findings, alone=True, pinches=pinched)
     if not len(stuck):
         return found
     return replace(found, unresolved=found.unresolved + _clusters(stuck, chart))
+
+
+def _barriers(stuck: Pairs, rows: Array, chart: Chart) -> list[Ball]:
+    """Balls that end curves at the undecided boxes they run into: those with findings of the box's own size beside."""
+    from scipy.spatial import cKDTree
+
+    from patchwright.ssi._subdivision_kernel import TRANSVERSAL
+
+    rows = rows[rows[:, 0] == TRANSVERSAL]
+    if not len(stuck) or not rows.size:
+        return []
+    p, q = (chart.pieces.parameters(rows[:, 1 + k].astype(np.int64), rows[:, 11 + 2 * k : 13 + 2 * k]) for k in (0, 1))
+    hull = stuck.hull
+    size = (hull[:, 1::2] - hull[:, ::2]).max(axis=0)
+    close = (np.abs(p - q) <= NEAR * size).all(axis=1)
+    if not close.any():
+        return []
+    middle = 0.5 * (hull[:, ::2] + hull[:, 1::2])
+    far = cKDTree(0.5 * (p + q)[close] / size).query(middle / size, p=np.inf)[0]
+    beside = stuck.where(far <= NEAR)
+    out = []
+    for k, box in zip(beside.kp, beside.hull, strict=True):
+        net = restricted(chart.pieces.nets[[k]], *local(chart.cell(np.array([k])), box[None]))[0]
+        points = (net[..., :3] / net[..., 3:]).reshape(-1, 3)
+        centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
+        radius = float(np.linalg.norm(points - centre, axis=1).max())
+        out.append(Ball(centre, radius, "pinch", 0.0, (), lead=lambda jets, lengths, which: (jets, lengths)))
+    return out
 
 
 def _clusters(stuck: Pairs, chart: Chart) -> tuple[Unresolved, ...]:
@@ -85,12 +124,14 @@ def _clusters(stuck: Pairs, chart: Chart) -> tuple[Unresolved, ...]:
 
 
 def _spanned(surface: NurbsSurface) -> NurbsSurface:
-    """The surface with at least four spans in every direction."""
+    """The surface with at least four spans in a closed direction."""
     more: list[Array] = []
-    for breaks in surface.breaks:
-        parts = -(-SPANS // (breaks.size - 1))
-        inner = np.linspace(breaks[:-1], breaks[1:], parts + 1)[1:-1]
-        more.append(np.sort(inner.ravel()))
+    net = surface.control_points
+    size = float(np.ptp(net.reshape(-1, 3), axis=0).max())
+    for axis, breaks in enumerate(surface.breaks):
+        rows = np.moveaxis(net, axis, 0)
+        parts = -(-SPANS // (breaks.size - 1)) if np.abs(rows[0] - rows[-1]).max() <= 1e-9 * size else 1
+        more.append(np.sort(np.linspace(breaks[:-1], breaks[1:], parts + 1)[1:-1].ravel()))
     return surface.insert_knots(*more)
 
 

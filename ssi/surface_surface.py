@@ -15,6 +15,7 @@ convexity across is certified.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -92,12 +93,14 @@ def assembled(
     findings: tuple[Array, int],
     *,
     alone: bool = False,
+    pinches: Sequence[Ball] = (),
 ) -> Intersection:
     """Curves and contacts from the findings (k, ROW) of subdivision on pieces, and the number of pairs left over.
 
-    `alone`: both surfaces are one; a finding then stands for both orders of its two places.
+    `alone`: both surfaces are one; a finding then stands for both orders of its two places, and curves may end at
+    the `pinches` inside it.
     """
-    return _Work(*surfaces, nurbs, pieces, frame, tol, *findings, alone=alone).result()
+    return _Work(*surfaces, nurbs, pieces, frame, tol, *findings, alone=alone, pinches=pinches).result()
 
 
 class _Work:
@@ -115,9 +118,10 @@ class _Work:
         left: int,
         *,
         alone: bool = False,
+        pinches: Sequence[Ball] = (),
     ) -> None:
         self.a, self.b, self.nurbs, self.pieces, self.frame, self.tol = a, b, nurbs, pieces, frame, tol
-        self.rows, self.left, self.alone = rows, left, alone
+        self.rows, self.left, self.alone, self.pinches = rows, left, alone, list(pinches)
         self.codes: IntArray = rows[:, 0].astype(np.int64)
         self.ground = Ground(a, b, pieces, frame, tol)
         self.unresolved: list[Unresolved] = []
@@ -128,7 +132,7 @@ class _Work:
 
         balls, plain = balls_of(self.rows, self.tol, self.pieces)
         if self.alone:
-            balls = [both_ways(ball) for ball in balls]
+            balls = [both_ways(ball) for ball in balls] + self.pinches
         branches: list[Arc] = []
         for code, follow in ((TRANSVERSAL, crossing_arcs), (TANGENT, touching_arcs)):
             seeds = self.rows[self.codes == code]
@@ -245,6 +249,8 @@ class _Work:
         out: list[Contact] = []
         for k, ball in enumerate(balls):
             arcs = sum((arc.ends[0] == k) + (arc.ends[1] == k) for arc in branches)
+            if ball.kind == "pinch":
+                continue
             if ball.kind == "cluster":
                 if arcs == 0 and not ball.pole:
                     if not self._on(ball, branches):
