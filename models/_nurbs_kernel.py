@@ -3,7 +3,8 @@
 Letters follow Piegl and Tiller, The NURBS Book (2nd ed. 1997): degrees p and q, knot vectors U and V, spans i with
 U[i] <= u < U[i+1]. Basis rows are raised degree by degree (A2.2); a derivative of order r raises the last r degrees
 with the derivative formula (2.9) instead, so no triangular tables are kept. Nets are homogeneous, (x w, y w, z w,
-w), or plain.
+w), or plain. Large results are filled in, not made: numpy asks the system for large pages, numba does not, and a first
+touch of every small one costs more than the arithmetic.
 """
 # mypy: disable-error-code="untyped-decorator,no-any-return,no-untyped-def,no-untyped-call"
 
@@ -79,16 +80,15 @@ def banded_product(first: IntArray, rows: Array, net: Array) -> Array:
 
 @kernel
 def tensor_product(
-    first_u: IntArray, rows_u: Array, first_v: IntArray, rows_v: Array, net: Array, divide: bool
-) -> Array:
-    """(k, l, 3) points of the tensor grid, or (k, l, d) homogeneous sums when `divide` is false."""
+    first_u: IntArray, rows_u: Array, first_v: IntArray, rows_v: Array, net: Array, divide: bool, out: Array
+) -> None:
+    """out (k, l, 3) = points of the tensor grid, or (k, l, d) homogeneous sums when `divide` is false."""
     k_count, width_u = rows_u.shape
     l_count, width_v = rows_v.shape
     m = net.shape[1]
     d = net.shape[2]
     columns = m * d
     flat = net.reshape(net.shape[0], columns)
-    out = np.empty((k_count, l_count, d - 1 if divide else d))
     line = np.empty(columns)
     for k in range(k_count):
         f = first_u[k]
@@ -138,7 +138,6 @@ def tensor_product(
                 out[k, j, 0] = x
                 out[k, j, 1] = y
                 out[k, j, 2] = z
-    return out
 
 
 @making
@@ -204,12 +203,11 @@ def bicubic_sum(
 
 
 @kernel
-def bicubic_points(U: Array, V: Array, net: Array, u: Array, v: Array) -> Array:
-    """(k, 3) points of a rational bicubic net (n, m, 4) at the parameters u, v, each (k,): the case that is asked
+def bicubic_points(U: Array, V: Array, net: Array, u: Array, v: Array, out: Array) -> None:
+    """out (k, 3) = points of a rational bicubic net (n, m, 4) at the parameters u, v, each (k,): the case that is asked
     for most."""
     n = net.shape[0]
     m = net.shape[1]
-    out = np.empty((u.shape[0], 3))
     table_u = cubic_table(U, n, 0, 0)
     table_v = cubic_table(V, m, 0, 0)
     spans_u, scale_u = span_table(U, 3, n, u.shape[0])
@@ -223,7 +221,6 @@ def bicubic_points(U: Array, V: Array, net: Array, u: Array, v: Array) -> Array:
         out[k, 0] = scale * bicubic_sum(net, i - 3, j - 3, 0, a, b)
         out[k, 1] = scale * bicubic_sum(net, i - 3, j - 3, 1, a, b)
         out[k, 2] = scale * bicubic_sum(net, i - 3, j - 3, 2, a, b)
-    return out
 
 
 @inner
@@ -269,9 +266,10 @@ def quotient(sums: Array, a1: int, b1: int, binomial: Array) -> None:
 
 @kernel
 def scattered(
-    U: Array, p: int, V: Array, q: int, net: Array, u: Array, v: Array, lowest: tuple[int, int], order: tuple[int, int]
-) -> Array:
-    """(k, a, b, 3) derivatives of orders lowest..order in u and v at the scattered parameters (u, v), each (k,).
+    U: Array, p: int, V: Array, q: int, net: Array, u: Array, v: Array, lowest: tuple[int, int],
+    order: tuple[int, int], out: Array,
+) -> None:  # fmt: skip
+    """out (k, a, b, 3) = derivatives of orders lowest..order in u and v at the scattered parameters (u, v), each (k,).
 
     A net of (n, m, 4) is homogeneous: the quotient rule (4.20) then needs all lower orders, which are worked out on
     the way.
@@ -284,7 +282,6 @@ def scattered(
     b0 = 0 if rational else lowest[1]
     a1 = order[0] + 1
     b1 = order[1] + 1
-    out = np.empty((u.shape[0], a1 - lowest[0], b1 - lowest[1], 3))
     rows_u = np.empty((a1, p + 1))
     rows_v = np.empty((b1, q + 1))
     sums = np.empty((a1, b1, 4))
@@ -322,7 +319,6 @@ def scattered(
             for f in range(lowest[1], b1):
                 for c in range(3):
                     out[k, e - lowest[0], f - lowest[1], c] = sums[e, f, c]
-    return out
 
 
 @kernel

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from patchwright.models import knots as knot_tools
-from patchwright.models.arrays import Array, frozen
+from patchwright.models.arrays import Array, IntArray, frozen
 from patchwright.models.errors import ParameterError
 from patchwright.models.nurbs_curve import NurbsCurve, checked_weights
 
@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 
 Direction = Literal["u", "v"]
 Side = Literal["u0", "u1", "v0", "v1"]
+JET: tuple[tuple[int, int], ...] = ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))
+"""Orders of the derivatives in a jet."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -153,10 +155,53 @@ class NurbsSurface:
             us, vs = np.broadcast_arrays(us, vs)
         flat_u, flat_v = knot_tools.locked(us.ravel()), knot_tools.locked(vs.ravel())
         if self.rational and (p, q) == (3, 3) and tuple(high) == (0, 0):
-            return np.asarray(bicubic_points(U, V, self.homogeneous, flat_u, flat_v).reshape(*us.shape, 1, 1, 3))
+            points = np.empty((flat_u.shape[0], 3))
+            bicubic_points(U, V, self.homogeneous, flat_u, flat_v, points)
+            return points.reshape(*us.shape, 1, 1, 3)
         low, high = (int(low[0]), int(low[1])), (int(high[0]), int(high[1]))
-        out = scattered(U, p, V, q, self.homogeneous, flat_u, flat_v, low, high)
-        return np.asarray(out.reshape(*us.shape, *out.shape[1:]))
+        out = np.empty((flat_u.shape[0], high[0] - low[0] + 1, high[1] - low[1] + 1, 3))
+        scattered(U, p, V, q, self.homogeneous, flat_u, flat_v, low, high, out)
+        return out.reshape(*us.shape, *out.shape[1:])
+
+    def jet(self, u: npt.ArrayLike, v: npt.ArrayLike, order: int = 2) -> Array:
+        """(..., c, 3) S, S_u, S_v, S_uu, S_uv, S_vv at broadcast parameters: all up to a total order of 0, 1 or 2, so
+        c is 1, 3 or 6.
+
+        Raises
+        ------
+        ParameterError : a parameter outside the domain by more than round-off, or another order.
+        """
+        members = _jet_members(order)
+        if order == 0 or not self.rational or self.degree != (3, 3):
+            d = self.derivatives(u, v, (order, order))
+            return np.stack([d[..., a, b, :] for a, b in members], axis=-2)
+        from patchwright.models._jet_kernel import bicubic_jets
+
+        us, vs = knot_tools.inside(self.domain[0], u, "u"), knot_tools.inside(self.domain[1], v, "v")
+        us, vs = np.broadcast_arrays(us, vs)
+        out = np.empty((us.size, len(members), 3))
+        flat = knot_tools.locked(us.ravel()), knot_tools.locked(vs.ravel())
+        bicubic_jets(*self.knots, self.homogeneous, *flat, int(order), np.arange(len(members)), out)
+        return out.reshape(*us.shape, *out.shape[1:])
+
+    def grid_jet(self, u: npt.ArrayLike, v: npt.ArrayLike, order: int = 2) -> Array:
+        """(k, l, c, 3) as `jet`, on the tensor grid of parameters u (k,) and v (l,)."""
+        members = _jet_members(order)
+        if order == 0 or not self.rational or self.degree[1] != 3:
+            return np.stack([self.grid(u, v, nu) for nu in members], axis=-2)
+        return self._grid_jets(u, v, int(order), np.arange(len(members)))
+
+    def _grid_jets(self, u: npt.ArrayLike, v: npt.ArrayLike, order: int, wanted: IntArray) -> Array:
+        from patchwright.models._jet_kernel import grid_jets
+        from patchwright.models._nurbs_kernel import basis_table
+
+        us = knot_tools.locked(knot_tools.inside(self.domain[0], np.ravel(u), "u"))
+        vs = knot_tools.locked(knot_tools.inside(self.domain[1], np.ravel(v), "v"))
+        tables = (basis_table(U, p, t, order) for U, p, t in zip(self.knots, self.degree, (us, vs), strict=True))
+        (first_u, rows_u), (first_v, rows_v) = tables
+        out = np.empty((us.size * vs.size, wanted.size, 3))
+        grid_jets(first_u, rows_u, first_v, rows_v, self.homogeneous, wanted, out)
+        return out.reshape(us.size, vs.size, wanted.size, 3)
 
     def grid(self, u: npt.ArrayLike, v: npt.ArrayLike, nu: tuple[int, int] = (0, 0)) -> Array:
         """(k, l, 3) the derivative of order `nu` on the tensor grid of parameters u (k,) and v (l,).
@@ -166,7 +211,9 @@ class NurbsSurface:
         ParameterError : as for a call.
         """
         _check_order(nu)
-        from patchwright.models._nurbs_kernel import basis_table, tensor_product
+        if self.rational and self.degree[1] == 3 and tuple(nu) in JET[1:]:
+            return self._grid_jets(u, v, int(sum(nu)), np.array([JET.index(tuple(nu))]))[..., 0, :]
+        from patchwright.models._nurbs_kernel import basis_table
 
         (u_domain, v_domain), (U, V), (p, q), net = self.domain, self.knots, self.degree, self.homogeneous
         us = knot_tools.locked(knot_tools.inside(u_domain, np.ravel(u), "u"))
@@ -175,9 +222,9 @@ class NurbsSurface:
         first_u, rows_u = basis_table(U, p, us, a1)
         first_v, rows_v = basis_table(V, q, vs, b1)
         if self.weights is None or (a1, b1) == (0, 0):
-            return np.asarray(tensor_product(first_u, rows_u[a1], first_v, rows_v[b1], net, self.rational))
+            return _grid_sums(first_u, rows_u[a1], first_v, rows_v[b1], net, self.rational)
         sums = {
-            (a, b): tensor_product(first_u, rows_u[a], first_v, rows_v[b], net, False)
+            (a, b): _grid_sums(first_u, rows_u[a], first_v, rows_v[b], net, False)
             for a in range(a1 + 1)
             for b in range(b1 + 1)
         }
@@ -301,6 +348,20 @@ class NurbsSurface:
         points = np.take(self.control_points, -end, axis=across)
         weights = None if self.weights is None else np.take(self.weights, -end, axis=across)
         return NurbsCurve(self.degree[along], self.knots[along], points, weights)
+
+
+def _grid_sums(first_u: IntArray, rows_u: Array, first_v: IntArray, rows_v: Array, net: Array, divide: bool) -> Array:
+    from patchwright.models._nurbs_kernel import tensor_product
+
+    out = np.empty((first_u.shape[0], first_v.shape[0], net.shape[2] - divide))
+    tensor_product(first_u, rows_u, first_v, rows_v, net, divide, out)
+    return out
+
+
+def _jet_members(order: int) -> tuple[tuple[int, int], ...]:
+    if order not in (0, 1, 2):
+        raise ParameterError(f"a jet has the order 0, 1 or 2, got {order}")
+    return JET[: (1, 3, 6)[order]]
 
 
 def _check_order(nu: tuple[int, int]) -> None:

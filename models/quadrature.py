@@ -51,6 +51,9 @@ def refined(rate: Rate, breaks: Array, accuracy: float, *, noise: float = 0.0, d
     done: list[Array] = []
     settled = True
     for _ in range(deepest):
+        if not np.isfinite(whole).all():
+            settled = False
+            break
         middle = 0.5 * (a + b)
         left, right = gauss(rate, a, middle), gauss(rate, middle, b)
         error = np.abs(left + right - whole)
@@ -65,9 +68,6 @@ def refined(rate: Rate, breaks: Array, accuracy: float, *, noise: float = 0.0, d
             break
         a, b = np.concatenate((a, middle)), np.concatenate((middle, b))
         whole = np.concatenate((left[~good], right[~good]))
-        if not np.isfinite(whole).all():
-            settled = False
-            break
     else:
         settled = False
     starts.append(a)
@@ -86,7 +86,7 @@ def inverted(rate: Callable[[IntArray, Array], Array], a: Array, b: Array, wante
         integral over the whole at least what is wanted
     """
     low, high = a.copy(), b.copy()
-    t = 0.5 * (a + b)
+    t = np.where(wanted <= 0.0, a, 0.5 * (a + b))
     active = np.arange(a.shape[0])
     for _ in range(2 * DEEPEST):
         if not active.size:

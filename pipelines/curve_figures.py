@@ -8,6 +8,7 @@ import numpy as np
 
 from patchwright.models.arrays import Array
 from patchwright.models.interpolation import SCHEMES, interpolate
+from patchwright.models.interpolation.local_slopes import parabola_slopes
 from patchwright.models.nurbs_curve import NurbsCurve
 from patchwright.pipelines import c2gbp_tables, quadratic_tables
 from patchwright.pipelines.c2gbp_tables import Errors
@@ -34,10 +35,12 @@ def scheme_figure(folder: Path) -> ChartSheet:
 def paper_figures(
     folder: Path, knots: tuple[KnotTable, ...], cases: tuple[PolygonCase, ...], errors: tuple[Errors, ...]
 ) -> list[ChartSheet]:
-    """One sheet for each figure of the papers that shows data."""
+    """One sheet for each figure of the papers but Figure 1 of each, which only names things."""
     return [
+        _joints(folder / "quadratic-figure-2.png"),
         _basis_maxima(folder / "quadratic-figure-3.png", knots[0]),
         *(_quadratic(folder / f"quadratic-figure-{4 + i}.png", case) for i, case in enumerate(cases)),
+        _construction(folder / "c2gbp-figure-2.png", errors[0]),
         *(_comparison(folder / f"c2gbp-figure-{3 + i}.png", e) for i, e in enumerate(errors)),
         *(_error_curves(folder / f"c2gbp-figure-{6 + i}.png", e) for i, e in enumerate(errors)),
         *(_error_bars(folder / f"c2gbp-figure-{9 + i}.png", e) for i, e in enumerate(errors)),
@@ -46,6 +49,38 @@ def paper_figures(
 
 def _line(curve: NurbsCurve) -> Array:
     return curve(np.linspace(*curve.domain, SAMPLES))
+
+
+def _joints(path: Path) -> ChartSheet:
+    """Figure 2: through a zigzag, a quadratic with its joints at the points must overshoot; by maxima it need not."""
+    t = np.arange(7.0)
+    P = np.stack((t, np.resize([0.0, 1.0], 7)), axis=1)
+    slopes = [parabola_slopes(t, P)[0]]
+    for chord in np.diff(P, axis=0):
+        slopes.append(2.0 * chord - slopes[-1])
+    inner = P[:-1] + np.array(slopes[:-1]) / 2.0
+    knots = np.concatenate(([0.0], np.repeat(t, 2), [6.0]))
+    ordinary = NurbsCurve(2, knots, np.concatenate((np.stack((P[:-1], inner), axis=1).reshape(-1, 2), P[-1:])))
+    maxima = interpolate(P, "quadratic-maxima", "uniform")
+    chart = Chart("a zigzag: quadratics with joints at the points and by maxima, beside the cubic", equal=True)
+    chart.line(_line(ordinary), "joints at the points", COLOURS[2], width=3.0)
+    chart.line(_line(maxima), "by maxima", COLOURS[1], width=4.0)
+    chart.line(_line(interpolate(P, "c2-cubic-clamped", "uniform")), "cubic", COLOURS[0], width=1.5)
+    chart.dots(maxima(maxima.breaks[1:-1]), "joints by maxima", COLOURS[1], size=7.0)
+    chart.dots(P, "points", COLOURS[6], size=9.0)
+    return ChartSheet(path, (chart,), 1, (1200, 500))
+
+
+def _construction(path: Path, e: Errors) -> ChartSheet:
+    """Figure 2: the inner points of C2GBP on problem 1."""
+    chart = Chart("C2GBP on problem 1: the polygon of the data and the control polygon", labels=("x", "y"))
+    nets = np.concatenate([piece.control_points for piece in e.curves[-1].bezier_pieces()])
+    chart.line(e.problem.points, "data polygon", COLOURS[6], width=1.5, style="--")
+    chart.line(nets, "control polygon", COLOURS[1], width=1.5)
+    chart.line(_line(e.curves[-1]), "C2GBP", COLOURS[0], width=3.0)
+    chart.dots(nets, "control points", COLOURS[1], size=7.0)
+    chart.dots(e.problem.points, "data", COLOURS[6], size=9.0)
+    return ChartSheet(path, (chart,), 1, (1200, 700))
 
 
 def _basis_maxima(path: Path, table: KnotTable) -> ChartSheet:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from textwrap import wrap
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from patchwright.pipelines.c2gbp_tables import Errors
 from patchwright.pipelines.quadratic_tables import KnotTable, PolygonCase
 
 NAMES = {"repeated": "maximum-1", "stepped": "maximum-2"}
+WIDTH = 120
 QUADRATIC_VERDICT = (
     "Tables 1 and 2 are reproduced to within 1.0e-3: the minimum found is lower than that of the printed knots, which",
     "were not fully converged. Lower values of F exist only with coincident knots, where the curve is C0.",
@@ -33,8 +35,8 @@ def quadratic_lines(knots: tuple[KnotTable, ...], cases: tuple[PolygonCase, ...]
         )
         lines += [
             "",
-            f"Table {number}: {NAMES[table.ends]}; F = {table.found.F:.4e} (printed knots: {table.printed_F:.4e}); "
-            f"{table.found.meeting.value}",
+            f"Table {number}: {NAMES[table.ends]}; F = {table.found.F:.4e} (printed knots: {table.printed_F:.4e})",
+            f"  {table.found.meeting.value}",
             f"{'i':>3}{'t_i':>12}{'printed':>12}{'difference':>12}{'s_i':>12}{'midpoint':>12}{'printed':>12}",
         ]
         for i, t in enumerate(table.knots):
@@ -55,8 +57,11 @@ def quadratic_lines(knots: tuple[KnotTable, ...], cases: tuple[PolygonCase, ...]
         if i < len(quadratic_tables.PRINTED_SECONDS):
             printed_row = quadratic_tables.PRINTED_SECONDS[i]
             lines.append(f"{'  printed (HP 735)':<42}" + "".join(f"{1e3 * e:>13.0f}" for e in printed_row))
-    told = dict.fromkeys(f"{case.name}: {note}" for case in cases for note in case.notes if note.startswith("Max"))
-    return [*lines, "", *QUADRATIC_VERDICT, *told]
+    lines += ["", *QUADRATIC_VERDICT, "What is left of the condition (3.2) in the four cases:"]
+    for case in cases:
+        lines += _wrapped(f"{case.name}:", "  ")
+        lines += [line for note in case.notes if note.startswith("Max") for line in _wrapped(note, "    ")]
+    return lines
 
 
 def c2gbp_lines(errors: tuple[Errors, ...]) -> list[str]:
@@ -64,7 +69,10 @@ def c2gbp_lines(errors: tuple[Errors, ...]) -> list[str]:
     names = [m[0] for m in c2gbp_tables.METHODS]
     lines = ["Geometric piecewise cubic Bezier (Fadhel, Omar); * marks figures reproduced to the last printed place"]
     for number, e in enumerate(errors, start=1):
-        lines += ["", f"{f'Table {number}, problem {e.problem.name}':<42}" + "".join(f"{n:>13}" for n in names)]
+        lines += [
+            "",
+            f"{f'Table {number}, problem {e.problem.name}':<44}" + "".join(f"{n:>11} " for n in names).rstrip(),
+        ]
         for k, measure in enumerate(("SSE", "MAE", "RMSE")):
             rows = (
                 ("printed", e.printed[k], np.zeros(len(names), dtype=bool)),
@@ -72,16 +80,20 @@ def c2gbp_lines(errors: tuple[Errors, ...]) -> list[str]:
                 ("true, f(x(t)) - y(t)", e.true[k], np.zeros(len(names), dtype=bool)),
             )
             for label, values, good in rows:
-                cells = "".join(f"{v:>12.5g}{'*' if g else ' '}" for v, g in zip(values, good, strict=True))
-                lines.append(f"  {measure + ': ' + label:<40}{cells}")
+                cells = "".join(f"{v:>11.6g}{'*' if g else ' '}" for v, g in zip(values, good, strict=True))
+                lines.append(f"  {measure + ': ' + label:<42}{cells}".rstrip())
         lines.append(
             f"  C2GBP at inner points: jump of the first derivative {e.jumps[0]:.1e}, of the second {e.jumps[1]:.1e} "
             "of the largest there: C1, not C2"
         )
         lines += [f"  {note}" for note in e.notes]
     lines.append("")
-    lines += [f"{name}: {c2gbp_tables.REASONS[name]}" for name in names]
-    return [*lines, *c2gbp_tables.MEASURES]
+    reasons = [f"{name}: {c2gbp_tables.REASONS[name]}" for name in names]
+    return lines + [line for said in (*reasons, *c2gbp_tables.MEASURES) for line in _wrapped(said, "")]
+
+
+def _wrapped(text: str, margin: str) -> list[str]:
+    return wrap(text, WIDTH, initial_indent=margin, subsequent_indent=margin + "  ")
 
 
 def quadratic_json(knots: tuple[KnotTable, ...], cases: tuple[PolygonCase, ...]) -> dict[str, Any]:

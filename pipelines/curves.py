@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 from pathlib import Path
+from textwrap import wrap
 from typing import Any
 
 from patchwright.models.interpolation import SCHEMES
@@ -72,7 +73,7 @@ def curves_lines(run: CurvesRun) -> list[str]:
     if run.tables is not None:
         lines += ["", *quadratic_lines(run.tables.knots, run.tables.cases), "", *c2gbp_lines(run.tables.errors)]
     if run.files:
-        lines += ["", "written: " + ", ".join(run.files)]
+        lines += ["", *wrap("written: " + ", ".join(run.files), 120, subsequent_indent="  ", break_on_hyphens=False)]
     return lines + list(run.notes)
 
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from patchwright.models.arrays import Array
 from patchwright.models.errors import ParameterError
+from patchwright.models.interpolation.local_slopes import parabola_slopes
 from patchwright.models.nurbs_surface import NurbsSurface
 
 
@@ -37,8 +38,8 @@ def bicubic_approximant(
         raise ParameterError(f"unknown twist {twist!r}; known are {', '.join(sorted(TWISTS))}")
     xi = _sites(u, points.shape[0], "u")
     eta = _sites(v, points.shape[1], "v")
-    x_u = _slopes(points, xi)
-    x_v = np.swapaxes(_slopes(np.swapaxes(points, 0, 1), eta), 0, 1)
+    x_u = parabola_slopes(xi, points)
+    x_v = np.swapaxes(parabola_slopes(eta, np.swapaxes(points, 0, 1)), 0, 1)
     x_uv = TWISTS[twist](points, x_u, x_v, xi, eta)
     m, n = len(xi) - 1, len(eta) - 1
     control = np.empty((3 * m + 1, 3 * n + 1, 3))
@@ -68,17 +69,6 @@ def _knots(sites: Array) -> Array:
     return np.concatenate([sites[:1].repeat(4), sites[1:-1].repeat(3), sites[-1:].repeat(4)])
 
 
-def _slopes(points: Array, sites: Array) -> Array:
-    """Bessel's slopes along the first axis: the parabola through each point and its neighbours."""
-    step = np.diff(sites)[:, None, None]
-    chord = np.diff(points, axis=0) / step
-    if len(sites) == 2:
-        return np.concatenate([chord, chord])
-    inner = (step[1:] * chord[:-1] + step[:-1] * chord[1:]) / (step[:-1] + step[1:])
-    first, last = 2 * chord[:1] - inner[:1], 2 * chord[-1:] - inner[-1:]
-    return np.concatenate([first, inner, last])
-
-
 def _zero(points: Array, x_u: Array, x_v: Array, xi: Array, eta: Array) -> Array:
     return np.zeros_like(points)
 
@@ -92,7 +82,7 @@ def _adini(points: Array, x_u: Array, x_v: Array, xi: Array, eta: Array) -> Arra
 
 def _bessel(points: Array, x_u: Array, x_v: Array, xi: Array, eta: Array) -> Array:
     """Bessel's twist: of the biquadratic through the 3 x 3 points round each point."""
-    return np.swapaxes(_slopes(np.swapaxes(x_u, 0, 1), eta), 0, 1)
+    return np.swapaxes(parabola_slopes(eta, np.swapaxes(x_u, 0, 1)), 0, 1)
 
 
 TWISTS: dict[str, Callable[[Array, Array, Array, Array, Array], Array]] = {

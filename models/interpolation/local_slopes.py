@@ -17,9 +17,12 @@ from patchwright.models.interpolation.hermite import cubic_from_tangents
 
 
 def parabola_slopes(s: Array, P: Array) -> Array:
-    """(n + 1, d) derivatives of the parabolas through three neighbouring points (Bessel); n of at least 2."""
-    h = np.diff(s)[:, None]
+    """(n + 1, ...) derivatives of the parabolas through three neighbouring points (Bessel) of P (n + 1, ...); of two
+    points, of the line."""
+    h = np.diff(s).reshape(-1, *(1,) * (P.ndim - 1))
     velocity = np.diff(P, axis=0) / h
+    if len(P) == 2:
+        return np.repeat(velocity, 2, axis=0)
     slopes = np.empty_like(P)
     slopes[1:-1] = (h[1:] * velocity[:-1] + h[:-1] * velocity[1:]) / (h[1:] + h[:-1])
     slopes[0] = 2.0 * velocity[0] - slopes[1]
@@ -41,11 +44,8 @@ def bessel(P: Array, s: Array) -> Interpolated:
 def catmull_rom(P: Array, s: Array) -> Interpolated:
     """Uniform, centripetal or chordal by its parameters; at the ends the point before the first is its mirror image,
     which makes the end slope that of the first chord."""
-    h = np.diff(s)[:, None]
-    velocity = np.diff(P, axis=0) / h
-    slopes = np.empty_like(P)
-    slopes[1:-1] = (h[1:] * velocity[:-1] + h[:-1] * velocity[1:]) / (h[1:] + h[:-1])
-    slopes[0], slopes[-1] = velocity[0], velocity[-1]
+    slopes = parabola_slopes(s, P)  # at inner points the slopes of Barry and Goldman's pyramid
+    slopes[0], slopes[-1] = (P[1] - P[0]) / (s[1] - s[0]), (P[-1] - P[-2]) / (s[-1] - s[-2])
     return _through(P, s, slopes)
 
 

@@ -27,7 +27,7 @@ def checked_points(points: npt.ArrayLike) -> Array:
     ------
     ParameterError : otherwise; the sentence names the index.
     """
-    P = np.array(points, dtype=np.float64)
+    P = numbers(points)
     if P.ndim != 2 or P.shape[0] < 2 or P.shape[1] < 1:
         raise ParameterError(f"points must be (n, d) with n of at least 2, got shape {P.shape}")
     if not np.isfinite(P).all():
@@ -39,7 +39,20 @@ def checked_points(points: npt.ArrayLike) -> Array:
     return P
 
 
-def parametrize(points: Array, wanted: Wanted = "centripetal") -> Array:
+def numbers(points: npt.ArrayLike) -> Array:
+    """A float64 copy.
+
+    Raises
+    ------
+    ParameterError : rows of unequal length, or what is not a real number.
+    """
+    try:
+        return np.array(points, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise ParameterError("points must be real numbers in rows of equal length") from error
+
+
+def parametrize(points: npt.ArrayLike, wanted: Wanted = "centripetal") -> Array:
     """(n + 1,) increasing parameters of points (n + 1, d).
 
     Parameters
@@ -49,21 +62,23 @@ def parametrize(points: Array, wanted: Wanted = "centripetal") -> Array:
 
     Raises
     ------
-    ParameterError : an unknown name, parameters that do not increase, an exponent that is not finite.
+    ParameterError : an unknown name, parameters that do not increase, an exponent that is not finite; points as in
+        `checked_points`.
     """
+    if not isinstance(wanted, str) and np.ndim(wanted) > 0:
+        return _increasing(np.array(wanted, dtype=np.float64), len(numbers(points)), "given parameters")
+    P = checked_points(points)
     if isinstance(wanted, str):
         if wanted == "abscissa":
-            return _increasing(points[:, 0], len(points), "x")
+            return _increasing(P[:, 0], len(P), "x")
         if wanted not in STEPS:
             names = ", ".join((*STEPS, "abscissa"))
             raise ParameterError(f"there are no parameters {wanted!r}; there are: {names}, an exponent, or given ones")
-        return normalised(STEPS[wanted](points))
-    if np.ndim(wanted) == 0:
-        exponent = float(wanted)  # type: ignore[arg-type]
-        if not np.isfinite(exponent):
-            raise ParameterError(f"the exponent of the chord length must be finite, got {exponent}")
-        return normalised(chords(points) ** exponent)
-    return _increasing(np.array(wanted, dtype=np.float64), len(points), "given parameters")
+        return normalised(STEPS[wanted](P))
+    exponent = float(wanted)  # type: ignore[arg-type]
+    if not np.isfinite(exponent):
+        raise ParameterError(f"the exponent of the chord length must be finite, got {exponent}")
+    return normalised(chords(P) ** exponent)
 
 
 def _increasing(t: Array, count: int, name: str) -> Array:

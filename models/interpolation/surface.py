@@ -10,7 +10,7 @@ import numpy.typing as npt
 from patchwright.models.arrays import Array
 from patchwright.models.errors import ParameterError
 from patchwright.models.interpolation.claims import Scheme, scheme_named
-from patchwright.models.interpolation.parameters import Wanted, parametrize
+from patchwright.models.interpolation.parameters import Wanted, numbers, parametrize
 from patchwright.models.nurbs_surface import NurbsSurface
 
 Pair = tuple[Any, Any]
@@ -36,7 +36,7 @@ def interpolate_surface(
     ParameterError : points of another shape or not finite, a scheme that is not linear, a direction in which every
         curve has coincident neighbours.
     """
-    P = np.array(points, dtype=np.float64)
+    P = numbers(points)
     if P.ndim != 3 or P.shape[2] != 3 or min(P.shape[:2]) < 2:
         raise ParameterError(f"points must be (n, m, 3) with n and m of at least 2, got shape {P.shape}")
     if not np.isfinite(P).all():

@@ -108,3 +108,14 @@ def test_given_parameters_and_the_abscissa_are_kept():
 def test_bad_parameters_give_one_clear_error(wanted, sentence):
     with pytest.raises(ParameterError, match=sentence):
         parametrize(P, wanted)
+
+
+def test_bad_points_give_one_clear_error():
+    with pytest.raises(ParameterError, match="points 1 and 2 coincide"):
+        parametrize([[0, 0], [1, 1], [1, 1]], "chord")
+    with pytest.raises(ParameterError, match="point 1 is not finite"):
+        parametrize([[0, 0], [np.nan, 1]], "uniform")
+    with pytest.raises(ParameterError, match="rows of equal length"):
+        parametrize([[0, 0], [1]], "chord")
+    with pytest.raises(ParameterError, match="real numbers"):
+        parametrize([["a", "b"], ["c", "d"]], "chord")

@@ -70,6 +70,25 @@ def test_every_change_of_representation_keeps_the_shape(seed, p, q, rational, cl
     assert (len(patches), len(patches[0])) == (len(s.breaks[0]) - 1, len(s.breaks[1]) - 1)
 
 
+@pytest.mark.parametrize("degree", [(3, 3), (1, 3), (5, 3), (2, 2)])
+@pytest.mark.parametrize("rational", [False, True])
+@pytest.mark.parametrize("order", [0, 1, 2])
+def test_a_jet_is_all_derivatives_up_to_its_order(degree, rational, order):
+    s = random_surface(5, degree, rational)
+    members = [(0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)][: (1, 3, 6)[order]]
+    u, v = np.array([0.0, 0.31, 1.0]), np.array([0.0, 0.2, 0.55, 1.0])
+    for found in (s.jet(u[:, None], v, order), s.grid_jet(u, v, order)):
+        assert found.shape == (3, 4, len(members), 3)
+        for c, nu in enumerate(members):
+            for i, j in np.ndindex(3, 4):
+                want = oracle.surface_derivative(degree, s.knots, s.control_points, s.weights, u[i], v[j], nu)
+                np.testing.assert_allclose(found[i, j, c], want, rtol=0, atol=1e-12 * max(1.0, np.abs(want).max()))
+    with pytest.raises(ParameterError, match="order 0, 1 or 2, got 3"):
+        s.jet(0.5, 0.5, 3)
+    with pytest.raises(ParameterError, match="outside the domain"):
+        s.grid_jet([0.5], [1.5], order)
+
+
 def test_grid_and_scattered_agree_and_broadcast():
     s = random_surface(2, (3, 2), True)
     u, v = np.linspace(0, 1, 7), np.linspace(0, 1, 5)
