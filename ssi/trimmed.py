@@ -2,8 +2,9 @@
 
 A curve ends where its (u, v) image crosses a trim loop: crossings of the polylines seed Newton's method on both curves.
 Pieces are kept when their middle lies inside the loops (even-odd rule) or on them. An overlap stays when it lies within
-the face and goes when it lies outside. Limits: a curve that runs along a loop and leaves it smoothly is cut where the
-polylines cross, not where it leaves; an overlap that a loop would cut is handed back as unresolved.
+the face, goes when it lies outside, and is cut in a plane (`trimmed_overlaps`). Limits: a curve that runs along a loop
+and leaves it smoothly is cut where the polylines cross, not where it leaves; an overlap that a loop would cut on a
+curved surface is handed back as unresolved.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from patchwright.models.analytic import Plane
 from patchwright.models.arrays import Array, BoolArray, IntArray
 from patchwright.models.knots import divided
 from patchwright.models.nurbs_curve import NurbsCurve
@@ -39,14 +41,17 @@ def trimmed(found: Intersection, surface: Surface, loops: Loops | None, side: in
     moved = [[[_moved(curve, shift) for curve in loop] for loop in loops] for shift in _shifts(surface)]
     curves = tuple(piece for curve in found.curves for piece in _cut(curve, surface, moved, side))
     points = tuple(p for p in found.points if _keeps(p, surface, moved, side))
-    inside = [_holds(overlap, surface, moved, side) for overlap in found.overlaps]
-    overlaps = tuple(o for o, state in zip(found.overlaps, inside, strict=True) if state)
-    open_ = tuple(
-        Unresolved(_range(o, 0), _range(o, 1), "an overlap is not cut back to the face's trims", o.surfaces)
-        for o, state in zip(found.overlaps, inside, strict=True)
-        if state is None
+    overlaps: list[Overlap] = []
+    open_: list[Unresolved] = []
+    for overlap in found.overlaps:
+        parts = _common(overlap, surface, moved, side)
+        overlaps += parts or []
+        if parts is None:
+            boxes = _range(overlap, 0), _range(overlap, 1)
+            open_.append(Unresolved(*boxes, "an overlap is not cut back to the face's trims", overlap.surfaces))
+    return replace(
+        found, curves=curves, points=points, overlaps=tuple(overlaps), unresolved=found.unresolved + tuple(open_)
     )
-    return replace(found, curves=curves, points=points, overlaps=overlaps, unresolved=found.unresolved + open_)
 
 
 Moved = Sequence[Sequence[Sequence[NurbsCurve]]]  # loops of curves, once for every period of the surface
@@ -65,24 +70,36 @@ def _range(overlap: Overlap, side: int) -> Box:
     return (u0, u1), (v0, v1)
 
 
-def _holds(overlap: Overlap, surface: Surface, moved: Moved, side: int) -> bool | None:
-    """Whether an overlap lies on the face; None when a part of it does, or its boundary is not known here."""
+def _common(overlap: Overlap, surface: Surface, moved: Moved, side: int) -> list[Overlap] | None:
+    """What of an overlap lies on the face; None where that cannot be told."""
+    from patchwright.ssi.trimmed_overlaps import Cutting, cut_overlap
+
     images = [c.uv_a if side == 0 else c.uv_b for c in overlap.boundary]
     border = [uv for uv in images if uv is not None]
     if not border or len(border) < len(images):
         return None
     lines = [uv(divided(uv.breaks, PER_SPAN)) for uv in border]
-    on_face = _inside(np.concatenate(lines), surface, moved)
-    rim = np.concatenate([_polyline(curve)[0] for loops in moved for loop in loops for curve in loop])
     tails, heads = np.concatenate([p[:-1] for p in lines]), np.concatenate([p[1:] for p in lines])
+    trims = [curve for loops in moved for loop in loops for curve in loop]
+    on_face = _inside(np.concatenate(lines), surface, moved)
+    rim = np.concatenate([_polyline(curve)[0] for curve in trims])
     within = _rays_cut(rim, tails, heads) % 2 == 1
-    reach = ON * float(np.ptp(np.concatenate(lines), axis=0).max())
     if within.any():  # on the overlap's border is not within it
-        away = np.min([uv.closest(rim[within]).distance for uv in border], axis=0)
-        within = away > reach
-    if within.any():
+        reach = ON * float(np.ptp(np.concatenate(lines), axis=0).max())
+        within[within] = np.min([uv.closest(rim[within]).distance for uv in border], axis=0) > reach
+    if not within.any() and (on_face.all() or not on_face.any()):
+        return [overlap] if on_face.all() else []
+    if not isinstance(surface, Plane):
         return None
-    return True if on_face.all() else None if on_face.any() else False
+    return cut_overlap(
+        overlap,
+        surface,
+        trims,
+        side,
+        lambda uv: _inside(uv, surface, moved),
+        lambda uv: np.asarray(_rays_cut(uv, tails, heads) % 2 == 1),
+        Cutting(_crossings, _restricted),
+    )
 
 
 def _cut(curve: IntersectionCurve, surface: Surface, moved: Moved, side: int) -> list[IntersectionCurve]:

@@ -69,20 +69,49 @@ def test_trims_leave_one_arc_of_a_loop_whole_where_the_loop_begins():
     assert not any(c.closed for c in found.curves)
 
 
-@pytest.mark.parametrize(("half", "area"), [(0.5, [1.0]), (1.0, [4.0]), (1.4, None), (None, [])])
-def test_overlaps_are_kept_dropped_or_handed_back_by_the_trims(half, area):
-    """A mesh square in the plane of a face trimmed to the square of half-side 1: inside, equal, across, outside."""
-    at, side = (np.zeros(3), half) if half else (np.array([2.2, 0, 0]), 0.5)
-    corners = at + side * np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
-    found = intersect(
-        Part("floor", NOTHING, FLOOR, trims=(square(1.0),)), Triangulation(corners, np.array([[0, 1, 2], [0, 2, 3]]))
-    )
-    if area is None:
-        assert not found.complete
-        assert "trims" in found.unresolved[0].reason
-    else:
+def sheet(half, at=(0.0, 0.0, 0.0)):
+    """A square of two triangles in the plane of the floor."""
+    corners = np.array(at) + half * np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
+    return Triangulation(corners, np.array([[0, 1, 2], [0, 2, 3]]))
+
+
+HOLE = np.pi * 0.25
+OVERLAPS = {
+    "inside": (sheet(0.25, (0.7, 0.7, 0)), [0.25]),
+    "the face itself": (sheet(1.0), [4.0 - HOLE]),
+    "beyond the face": (sheet(1.4), [4.0 - HOLE]),
+    "round the hole": (sheet(0.75), [2.25 - HOLE]),
+    "across a corner": (sheet(0.5, (1.0, 1.0, 0)), [0.25]),
+    "in the hole": (sheet(0.3), []),
+    "outside": (sheet(0.5, (2.2, 0, 0)), []),
+    "beside": (sheet(0.5, (1.5, 0, 0)), []),  # a common side, no area
+}
+
+
+@pytest.mark.parametrize("case", OVERLAPS)
+def test_overlaps_are_cut_back_to_the_trims(case):
+    """A mesh square in the plane of a face: the square of half-side 1 less a hole of radius 1/2."""
+    mesh, area = OVERLAPS[case]
+    face = Part("floor", NOTHING, FLOOR, trims=(square(1.0), (circle(0.5, clockwise=True),)))
+    for found in (intersect(face, mesh), intersect(mesh, face)):
         assert found.complete
-        assert [o.area for o in found.overlaps] == pytest.approx(area, rel=1e-14)
+        assert [o.area for o in found.overlaps] == pytest.approx(area, rel=1e-12)
+    for overlap in found.overlaps:
+        for piece in overlap.boundary:
+            assert np.abs(piece.curve(np.linspace(*piece.curve.domain, 9))[:, 2]).max() == 0.0
+
+
+def test_an_overlap_cut_in_two():
+    strip = Part("strip", NOTHING, FLOOR, trims=(square(1.0), (circle(0.5, clockwise=True),)))
+    bar = Triangulation(
+        np.array([[-2.0, -0.1, 0], [2, -0.1, 0], [2, 0.1, 0], [-2, 0.1, 0]]), np.array([[0, 1, 2], [0, 2, 3]])
+    )
+    found = intersect(strip, bar)
+    # the bar less what the hole takes: 2 times the integral of sqrt(1/4 - y^2) over |y| < 1/10
+    y = 0.1
+    taken = 2.0 * (y * np.sqrt(0.25 - y * y) + 0.25 * np.arcsin(2.0 * y))
+    assert found.complete
+    assert [o.area for o in found.overlaps] == pytest.approx([0.2 - 0.5 * taken] * 2, rel=1e-12)
 
 
 def test_contacts_outside_the_trims_are_dropped():
