@@ -1,4 +1,4 @@
-"""The command line: `patchwright check | repair | intersect | convert | curves | run | demo`.
+"""The command line: `patchwright check | repair | intersect | reparam | convert | curves | run | demo`.
 
 Only here do errors become sentences and exit codes: 0 done, 1 defects found, refused or not converged, 2 bad usage or
 input, 3 internal failure. Heavy packages are imported inside the commands, so that `--help` answers at once.
@@ -221,6 +221,28 @@ def intersect(
     else:
         _say("\n".join(sections_lines(result, names)))
     raise typer.Exit(DONE if result.found.complete else FOUND)
+
+
+@app.command()
+def reparam(
+    file: Annotated[Path, typer.Argument(help="STEP or IGES.", show_default=False)],
+    output: Annotated[Path, typer.Option("-o", "--output", help="STEP or IGES to write.", show_default=False)],
+    tolerance: Annotated[float | None, typer.Option(help="Length in model units [1e-4 of the diagonal].")] = None,
+    face: Annotated[
+        list[str] | None, typer.Option(help="Only faces of this name; may be repeated.", show_default=False)
+    ] = None,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Give CAD faces parameter lines spaced as they lie in space; exit code 1 when a face asked for had to be left."""
+    from patchwright.pipelines.reparam import reparam_json, reparam_lines, run_reparam
+
+    result = run_reparam(file, output, tolerance=tolerance, names=face or [], terminal=_terminal(quiet))
+    if json:
+        _say_json(reparam_json(result))
+    else:
+        _say("\n".join(reparam_lines(result)))
+    raise typer.Exit(DONE if result.complete else FOUND)
 
 
 @app.command()

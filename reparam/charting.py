@@ -70,6 +70,25 @@ def charted(regions: Sequence[Region], known: Neighbourhood) -> Charts:
     return Charts(tuple(charts), tuple(directions), tuple(tuple(n) for n in notes))
 
 
+def check_region(region: Region) -> None:
+    """That a grid fits into the region on its own, before it is charted together with others.
+
+    Raises
+    ------
+    ParameterError : as `charted`.
+    """
+    straight, x = _straightened(region), np.linspace(0.0, 1.0, STEPS + 1)
+    south, north, west, east = (straight.places(side.uv(x)) for side in region.sides)
+    _started(region, south, north, west, east)
+
+
+def _started(region: Region, south: Array, north: Array, west: Array, east: Array) -> Array:
+    try:
+        return start_grid(south, north, west, east)
+    except ParameterError as error:
+        raise ParameterError(f"{region.label}{error}") from None
+
+
 def _straightened(region: Region) -> Straightened:
     try:
         return Straightened.of(region.surface, region.box)
@@ -162,10 +181,7 @@ def _chart(
 ) -> Chart:
     s, t = own[0].nodes, own[1].nodes
     south, north, west, east = (straight.places(b.uv(x)) for b, x in zip(borders, (s, s, t, t), strict=True))
-    try:
-        start = start_grid(south, north, west, east)
-    except ParameterError as error:
-        raise ParameterError(f"{region.label}{error}") from None
+    start = _started(region, south, north, west, east)
     held = np.zeros(start.shape, dtype=bool)
     for crease in creases:
         if crease.region != i or crease.side is not None:

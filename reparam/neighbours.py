@@ -11,6 +11,7 @@ from patchwright.models.arrays import Array, IntArray
 from patchwright.reparam.region import Region
 
 SAMPLES = 17
+SAME = 1e-6  # of the size: sides this near are one
 AXES = (0, 0, 1, 1)  # the parameter that runs along south, north, west, east
 _ALL = slice(None)
 BORDER: tuple[tuple[slice | int, slice | int], ...] = ((_ALL, 0), (_ALL, -1), (0, _ALL), (-1, _ALL))
@@ -67,6 +68,21 @@ def neighbourhood(regions: Sequence[Region], gap: float) -> Neighbourhood:
     return Neighbourhood(
         tuple(shared), direction, parity.reshape(-1, 2), vertex.reshape(-1, 4), vertices, tuple(dropped)
     )
+
+
+def shared_within(regions: Sequence[Region], tolerance: float) -> float:
+    """How near sides must be to count as one: round-off of the size, and no more than the tolerance."""
+    return min(tolerance, SAME * max(r.size for r in regions))
+
+
+def components(regions: Sequence[Region], tolerance: float) -> list[list[int]]:
+    """The numbers of the regions that hang together by shared sides, group by group."""
+    if not regions:
+        return []
+    group = np.arange(len(regions))
+    for pair in _pairs(regions, shared_within(regions, tolerance)):
+        group[group == group[pair.follower]] = group[pair.leader]
+    return [np.flatnonzero(group == g).tolist() for g in np.unique(group)]
 
 
 def _pairs(regions: Sequence[Region], gap: float) -> list[SharedSide]:

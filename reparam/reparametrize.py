@@ -25,7 +25,7 @@ from patchwright.reparam.charting import Charts, charted
 from patchwright.reparam.curve_sites import fewest_sites
 from patchwright.reparam.defect import parametrisation_defect
 from patchwright.reparam.direction import Direction
-from patchwright.reparam.neighbours import AXES, Neighbourhood, neighbourhood
+from patchwright.reparam.neighbours import AXES, Neighbourhood, neighbourhood, shared_within
 from patchwright.reparam.reconciliation import reconciled
 from patchwright.reparam.refinement import MOST_SITES, Use, refined, thinned
 from patchwright.reparam.region import Region
@@ -37,7 +37,6 @@ MARGIN = 0.95  # of the tolerance: what is measured at samples must be below
 FIT_SAMPLES = 5  # per cell and direction while knots are put in
 VERIFY_SAMPLES = 20  # for the deviation that is reported
 ROUNDS = 25
-SAME = 1e-6  # of the size: sides this near are one
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -119,7 +118,7 @@ def _together(regions: list[Region], tolerance: float) -> tuple[Reparametrized, 
     before = [parametrisation_defect(r.surface, r.box) for r in regions]
     if all(r.whole and d <= GOOD for r, d in zip(regions, before, strict=True)):
         return tuple(_kept(r, d, tolerance) for r, d in zip(regions, before, strict=True))
-    known = neighbourhood(regions, min(tolerance, SAME * max(r.size for r in regions)))
+    known = neighbourhood(regions, shared_within(regions, tolerance))
     charts = charted(regions, known)
     directions = [
         _sites(number, direction, charts, known, tolerance) for number, direction in enumerate(charts.directions)
