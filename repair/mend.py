@@ -23,6 +23,7 @@ from patchwright.repair.crossings import CROSSING, crossing_pairs
 from patchwright.repair.decisions import Decisions
 from patchwright.repair.mend_cure import cure
 from patchwright.repair.mend_gaps import bridge_gaps
+from patchwright.repair.mend_notches import fill_notches
 from patchwright.repair.mend_openings import unite_as_decided
 from patchwright.repair.mend_overlaps import trim_overlaps
 from patchwright.repair.mend_seams import clean, conform_seams, orient_bodies, weld_copies
@@ -71,6 +72,7 @@ def mend(
         stage(work)
     tell("bridge", 0.4)
     bridge_gaps(work)
+    fill_notches(work)
     tell("cure", 0.6)
     cure(work)
     tell("unite", 0.7)

@@ -91,8 +91,9 @@ def _sameness(border: Border) -> float:
 
 
 def fill(
-    work: Work, rims: tuple[Border, ...], singles: list[int], pairs: list[tuple[int, int]], kind: str
+    work: Work, rims: tuple[Border, ...], singles: list[int], pairs: list[tuple[int, int]], kind: str, why: str = ""
 ) -> tuple[Bridge, ...]:
+    """Fill rims and join pairs of rims as actions of a kind; `why` replaces the reason found from the rims."""
     made = bridge(work.now, rims, singles, pairs)
     fresh = len(made.triangulation) - len(work.now)
     parents = np.concatenate([np.arange(len(work.now)), np.full(fresh, -1)])
@@ -100,7 +101,9 @@ def fill(
     for one in made.bridges:
         points = work.now.vertices[np.concatenate(one.rims)]
         size = float(np.linalg.norm(np.ptp(points, axis=0)))
-        if kind == "close":
+        if why:
+            reason = why
+        elif kind == "close":
             reason = "openings are to be closed"
         elif len(one.rims) == 2:
             reason = f"two rims face each other across {one.width:.3g} with agreeing normals"
