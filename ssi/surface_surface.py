@@ -2,14 +2,15 @@
 
 Method. Both surfaces fall into Bezier pieces in a common scale; dual subdivision (`_subdivision_kernel`) excludes,
 explains or hands back every pair of boxes: completeness comes from there alone. Arcs are followed from the points it
-found to the borders of the pieces (`_tracing_kernel`) and joined across them; branch points, poles and tangent points
-end them. Branches are split at branch points, at poles and where they cross the seam of a closed surface.
+found to the borders of the pieces (`_tracing_kernel`) and joined across them; branch points, poles and points where the
+surfaces agree to second order (`osculation`) end them. Every node is refined by the paper's auxiliary planes (HJR
+section 4; `_jet_kernel.slice_newton`). Branches are split at branch points, at poles and where they cross the seam of a closed surface.
 
 Surfaces that coincide in part go another way (`coincident_surfaces`).
 
 Limits. Coincident regions whose parameters do not correspond affinely are handed back as unresolved boxes. Crossing
-angles below about 1e-5 rad of curved surfaces, and tangent curves into the apex of a cone, can spend the budget or
-fail to be followed; both are handed back. Tangency is decided by samples within the tolerance along a valley whose
+angles of curved surfaces far below 6e-7 rad, and tangent curves into the apex of a cone, can spend the budget or fail
+to be followed; both are handed back. Tangency is decided by samples within the tolerance along a valley whose
 convexity across is certified.
 """
 
