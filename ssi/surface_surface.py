@@ -4,7 +4,8 @@ Method. Both surfaces fall into Bezier pieces in a common scale; dual subdivisio
 explains or hands back every pair of boxes: completeness comes from there alone. Arcs are followed from the points it
 found to the borders of the pieces (`_tracing_kernel`) and joined across them; branch points, poles and points where the
 surfaces agree to second order (`osculation`) end them. Every node is refined by the paper's auxiliary planes (HJR
-section 4; `_jet_kernel.slice_newton`). Branches are split at branch points, at poles and where they cross the seam of a closed surface.
+section 4; `_jet_kernel.slice_newton`). Branches are split at branch points, at poles and where they cross the seam of a
+closed surface.
 
 Surfaces that coincide in part go another way (`coincident_surfaces`).
 
