@@ -80,5 +80,4 @@ def begin(task: Recipe, assembly: Assembly | None, shown: Terminal) -> Study:
         domain=task.domain,
         plan=known,
         reports=(StageReport("read", time.perf_counter() - started),),
-        notes=around.reasons,
     )

@@ -119,6 +119,8 @@ def study_lines(study: Study) -> list[str]:
     if study.truth:
         lines.append("  against the known truth")
         lines += [f"    {key:<52} {_short(value)}" for key, value in study.truth.items()]
+    if study.before is not None and repaired is not None:
+        lines += [f"  domain: {sentence}" for sentence in study.before.summary.get("domain") or ()]
     lines += [f"  note: {note}" for note in study.notes]
     if study.files:
         lines.append(f"  written to {study.folder}/: {', '.join(study.files)}")
@@ -158,6 +160,7 @@ def _repaired_json(repaired: Repaired) -> dict[str, Any]:
         "ledger": [asdict(e) for e in repaired.ledger],
         "faces": [asdict(f) for f in repaired.faces],
         "seams": [asdict(s) for s in repaired.seams],
+        "regions": [asdict(r) for r in repaired.regions],
     }
 
 

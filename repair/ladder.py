@@ -14,7 +14,8 @@ from patchwright.repair.decisions import Decisions
 from patchwright.repair.diagnosis import Diagnosis
 from patchwright.repair.domain import Domain
 from patchwright.repair.plan import Plan, compared, plan_of
-from patchwright.repair.result import LedgerEntry, Progress, Repaired, Rung
+from patchwright.repair.regions import regions
+from patchwright.repair.result import LedgerEntry, Progress, Repaired, Rung, Verdict
 from patchwright.repair.surroundings import Surroundings, surroundings
 
 SCOPES = ("least", "all")
@@ -80,6 +81,10 @@ def repair(
             progress=say,
         )
         result = with_aside(replace(result, ledger=(*task.entries, *result.ledger)), task.model, task.around)
+    if result.verdict is not Verdict.REFUSED:
+        say("measuring part by part", 0.0)
+        inside = task.model.triangulation, result.triangulation
+        result = replace(result, regions=regions(*inside, task.limits.fit, dict(task.around.domain.tolerances)))
     if plan is None:
         return result
     return replace(result, ledger=(*result.ledger, *_against(plan, result.ledger, task.decisions.diagonal)))

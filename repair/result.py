@@ -14,6 +14,7 @@ from patchwright.repair.deviation import Deviation
 
 if TYPE_CHECKING:
     from patchwright.repair.network import PatchNetwork
+    from patchwright.repair.regions import Region
 
 Progress = Callable[[str, float], None]
 Point = tuple[float, float, float]
@@ -116,6 +117,7 @@ class Repaired:
     assembly : faces with topology, empty for a refusal
     grid : structured surface grid, None where no face is four-sided
     network : the fitted patches, None when CAD faces were kept
+    regions : the deviation part by part, invented surface included; empty for a refusal
     """
 
     verdict: Verdict
@@ -130,6 +132,7 @@ class Repaired:
     grid: StructuredGrid | None = None
     network: PatchNetwork | None = None
     figures: dict[str, float | int | str | bool] = field(default_factory=dict)
+    regions: tuple[Region, ...] = ()
 
     @property
     def converged(self) -> bool:

@@ -25,7 +25,8 @@ def components(exam: Examination) -> Finding:
     if len(closed) == 1:
         return Finding(figures=figures)
     area = np.bincount(label, weights=exam.body.areas)
-    stray = (area < STRAY * area.sum()) & ~closed
+    outer = np.bincount(label, weights=exam.surroundings.aside[exam.body_index]) > 0
+    stray = (area < STRAY * area[~outer].sum()) & ~closed & ~outer
     defects: list[Defect] = []
     cases: tuple[tuple[BoolArray, Severity, str], ...] = (
         (stray, "warning", "a small open piece, connected to nothing"),

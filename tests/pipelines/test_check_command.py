@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 
 import numpy as np
 import pytest
@@ -18,8 +19,11 @@ from patchwright.pipelines.summary import checked_lines
 
 def command(monkeypatch, capfd, *words) -> tuple[int, str, str]:
     monkeypatch.setattr("sys.argv", ["patchwright", *map(str, words)])
+    stdout = os.dup(1)  # the command sends descriptor 1 to stderr for good
     with pytest.raises(SystemExit) as leaving:
         main()
+    os.dup2(stdout, 1)
+    os.close(stdout)
     out, err = capfd.readouterr()
     return int(leaving.value.code or 0), out, err
 
