@@ -6,7 +6,7 @@ Each pair is solved in a child process; one that takes longer than the limit or 
 Judged: every number finite; every curve within its residual of both surfaces, by its parameters, by the surface's
 equation where it has one, and by the distance from a mesh; no errors but `GeometryError`; and, where one surface has an
 equation and the answer is complete, that curves lie near every place where the equation changes sign strongly along a
-grid on the other surface or along the edges of a mesh.
+grid on the other surface or along a lattice on each triangle of a mesh.
 """
 
 from __future__ import annotations
@@ -30,6 +30,7 @@ from patchwright.ssi import Intersection, intersect
 
 LIMIT = 30.0  # seconds of its own time for a pair
 PATIENCE = 600.0  # seconds on the clock, for a process that waits
+TOLD = 100  # pairs between two lines of progress
 GRID = 41  # places a side at which the oracle asks
 KINDS = ("plane", "cylinder", "cone", "sphere", "torus", "graph", "rational", "kinked", "closed", "mesh")
 Thing = Any
@@ -191,7 +192,7 @@ def _missed(one: Thing, other: Thing, found: Intersection, size: float) -> str:
     """Whether a place on `other` at which the equation of `one` changes sign is far from every curve."""
     if not isinstance(one, Plane | Sphere | Torus | Cylinder) or found.overlaps:
         return ""
-    middle, reach = (_edges_across if isinstance(other, Triangulation) else _cells_across)(one, other, size)
+    middle, reach = (_lattice_across if isinstance(other, Triangulation) else _cells_across)(one, other, size)
     if not len(middle):
         return ""
     cloud = [c.curve(np.linspace(*c.curve.domain, 801)) for c in found.curves] + [
@@ -206,9 +207,14 @@ def _missed(one: Thing, other: Thing, found: Intersection, size: float) -> str:
     )
 
 
-def _edges_across(one: Thing, mesh: Triangulation, size: float) -> tuple[np.ndarray, np.ndarray]:
-    """Middles of a mesh's edges along which the equation of `one` changes sign, and how far a curve may be."""
-    ends = mesh.vertices[np.stack([mesh.triangles, np.roll(mesh.triangles, -1, axis=1)], axis=-1).reshape(-1, 2)]
+def _lattice_across(one: Thing, mesh: Triangulation, size: float) -> tuple[np.ndarray, np.ndarray]:
+    """Middles of lines of a lattice on each triangle along which the equation of `one` changes sign, and how far a
+    curve may be."""
+    n = 6
+    corner = np.array([(i, j, n - i - j) for i in range(n + 1) for j in range(n + 1 - i)])
+    lines = np.argwhere(np.triu(np.abs(corner[:, None] - corner[None]).sum(axis=2) == 2))
+    points = np.einsum("pk,mkd->mpd", corner / n, mesh.corners)
+    ends = points[:, lines].reshape(-1, 2, 3)
     height, within = _equation(one, ends, size)
     across = (height[:, 0] * height[:, 1] < 0.0) & (np.abs(height).min(axis=1) > 1e-7 * size) & within.all(axis=1)
     length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
@@ -334,6 +340,8 @@ def main() -> None:
         slow = max(slow, got.seconds)
         if got.state in ("crash", "hang", "wrong"):
             print(f"{index}: {got.kinds}: {got.state}: {got.what} ({got.seconds:.1f} s)", flush=True)  # noqa: T201
+        if states.total() % TOLD == 0:
+            print(f"{states.total()} pairs up to {index}: {dict(states)}", flush=True)  # noqa: T201
     print(dict(states), f"slowest {slow:.1f} s")  # noqa: T201
     for (which, state), count in sorted(kinds.items()):
         if state not in ("right", "refused"):
