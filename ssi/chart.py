@@ -17,6 +17,7 @@ from patchwright.models.arrays import Array, BoolArray, IntArray
 from patchwright.models.nurbs_surface import NurbsSurface
 from patchwright.ssi.bezier_pieces import BezierPieces, Frame
 
+SPANS = 4  # at least so many in a closed direction: then pieces touch in one way only
 SAME = 1e-12  # of the size: control points nearer than this are one
 CLEAR = 1e-9  # by which directions have to differ: far above the round-off of unit-size coordinates
 
@@ -83,6 +84,18 @@ class Chart:
         (n, 2), and boxes (n, 4)."""
         cell = self.cell(k) + np.repeat(shift, 2, axis=1)
         return restricted(self.along[axis][k], *local(cell, box)).reshape(k.size, -1, 3)
+
+
+def spanned(surface: NurbsSurface) -> NurbsSurface:
+    """The surface with at least four spans in a closed direction."""
+    more: list[Array] = []
+    net = surface.control_points
+    size = float(np.ptp(net.reshape(-1, 3), axis=0).max())
+    for axis, breaks in enumerate(surface.breaks):
+        rows = np.moveaxis(net, axis, 0)
+        parts = -(-SPANS // (breaks.size - 1)) if np.abs(rows[0] - rows[-1]).max() <= 1e-9 * size else 1
+        more.append(np.sort(np.linspace(breaks[:-1], breaks[1:], parts + 1)[1:-1].ravel()))
+    return surface.insert_knots(*more)
 
 
 def local(cell: Array, box: Array) -> tuple[Array, Array]:

@@ -87,7 +87,8 @@ def coincidences(a: NurbsSurface, b: NurbsSurface, hits: Array, frame: Frame, to
     """
     out: list[Coincidence] = []
     changes: list[Change] = []
-    for hit in hits:
+    low, high = np.array([*a.domain, *b.domain]).T
+    for hit in hits[((hits >= low) & (hits <= high)).all(axis=1)]:
         uv, st = hit[:2], hit[2:]
         spans = np.array([np.ptp(d) for d in a.domain])
         if any((np.abs(change(st) - uv) <= 1e-7 * spans).all() for change in changes):
@@ -166,9 +167,8 @@ def _span(surface: NurbsSurface, at: Array) -> tuple[Array, Array]:
 def matched(a: NurbsSurface, b: NurbsSurface, change: Change, frame: Frame, tol: float) -> Coincidence | None:
     """The cells on which the surfaces are the same; None without any."""
     moved = change.applied(b, a.breaks)
-    inner = [
-        (_inside(moved.breaks[axis], a.breaks[axis]), _inside(a.breaks[axis], moved.breaks[axis])) for axis in (0, 1)
-    ]
+    lines = [s.breaks for s in (a, moved)]
+    inner = [(lines_inside(q, p), lines_inside(p, q)) for p, q in zip(*lines, strict=True)]
     both = (a.insert_knots(inner[0][0], inner[1][0]), moved.insert_knots(inner[0][1], inner[1][1]))
     first: list[list[int]] = [[], []]
     count = []
@@ -233,7 +233,7 @@ def _snapped(U: Array, lines: Array) -> Array:
     return np.where(np.abs(U - nearest) <= SNAP * np.ptp(lines), nearest, U)
 
 
-def _inside(values: Array, breaks: Array) -> Array:
+def lines_inside(values: Array, breaks: Array) -> Array:
     """The values strictly inside the breaks' range and on none of them."""
     apart = np.abs(values[:, None] - breaks).min(axis=1) > SNAP * np.ptp(breaks)
     return np.asarray(values[apart & (values > breaks[0]) & (values < breaks[-1])])

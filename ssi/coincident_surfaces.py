@@ -7,6 +7,7 @@ subdivided and traced as for any two surfaces.
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -15,8 +16,15 @@ from patchwright.models.arrays import Array, BoolArray, IntArray
 from patchwright.models.nurbs_curve import NurbsCurve
 from patchwright.models.nurbs_surface import NurbsSurface
 from patchwright.ssi.bezier_pieces import Frame
-from patchwright.ssi.chart import Chart, independent, local, parallel_free, restricted
-from patchwright.ssi.coincidence import Change, Coincidence, coincidences, shared_points
+from patchwright.ssi.chart import Chart, independent, local, parallel_free, restricted, spanned
+from patchwright.ssi.coincidence import (
+    Change,
+    Coincidence,
+    coincidences,
+    lines_inside,
+    matched,
+    shared_points,
+)
 from patchwright.ssi.intersection import Contact, Intersection, IntersectionCurve, Unresolved
 from patchwright.ssi.neighbours import TOUCH, Pairs, apart_on, tangents, told_apart, touching
 from patchwright.ssi.overlap import overlaps
@@ -65,18 +73,20 @@ class Together:
     def beside(self, pairs: Pairs) -> BoolArray:
         """(n,) which pairs touch each other in the chart, and both the region in which the surfaces are one."""
         out = touching(pairs, self.slack)
-        for side, box, k in ((0, pairs.p, pairs.kp), (1, pairs.q, pairs.kq)):
+        for side, box, k in ((0, pairs.p, pairs.kp), (1, pairs.q - np.repeat(pairs.shift, 2, axis=1), pairs.kq)):
             i, j = self._spans(side, k)
             cell = self.charts[side].cell(k)
             n, m = self.charts[side].pieces.shape
+            round_u, round_v = (t > 0.0 for t in self.charts[side].period)
             near = np.zeros(len(pairs), dtype=bool)
             for di in (-1, 0, 1):
                 for dj in (-1, 0, 1):
-                    at = (i + di >= 0) & (i + di < n) & (j + dj >= 0) & (j + dj < m)
+                    at = ((i + di >= 0) & (i + di < n)) | round_u
+                    at &= ((j + dj >= 0) & (j + dj < m)) | round_v
                     for d, axis in ((di, 0), (dj, 1)):
                         column = 2 * axis + (1 if d > 0 else 0)
                         at &= (d == 0) | (np.abs(box[:, column] - cell[:, column]) <= self.slack[axis])
-                    r, c = np.clip(i + di, 0, n - 1), np.clip(j + dj, 0, m - 1)
+                    r, c = (i + di) % n, (j + dj) % m
                     if side == 1:
                         r, c = self.across[1][0][r], self.across[1][1][c]
                     near |= at & self._shared(r, c)
@@ -97,8 +107,10 @@ class Together:
             (i_b >= 0) & (j_b >= 0),
             (k_a >= 0) & (m_a >= 0),
         )
-        for way, rows in enumerate(ways):
-            at = np.flatnonzero(rows & ~out)
+        straight = ~pairs.shift.any(axis=1)
+        closed = [((pairs.shift == 0.0) | (np.array(c.period) > 0.0)).all(axis=1) for c in self.charts]
+        for way, rows in enumerate(ways):  # across a seam only on a surface that is closed there
+            at = np.flatnonzero(rows & ~out & (closed[way] if way < 2 else straight))
             if not at.size:
                 continue
             p = pairs.where(at)
@@ -156,24 +168,89 @@ def intersect_coincident(
     """
     from patchwright.ssi.surface_surface import assembled
 
-    found = coincidences(a, b, np.concatenate((hits, shared_points(a, b, frame, tol))), frame, tol)
+    found = coincidences(spanned(a), spanned(b), np.concatenate((hits, shared_points(a, b, frame, tol))), frame, tol)
     if not found:
         return None
-    one = found[0]
+    one, *more = found = _on_common_lines(found, frame, tol)
     both = Together(one, frame)
-    counts = [int(np.prod(c.pieces.shape)) for c in both.charts]
-    kp, kq = (x.ravel() for x in np.meshgrid(*(np.arange(n) for n in counts), indexing="ij"))
-    pairs = Pairs(both.charts[0].cell(kp), both.charts[1].cell(kq), kp, kq, np.zeros((kp.size, 2)))
-    near = both.beside(pairs)
-    far, stuck = told_apart(
-        pairs.where(near), both.explained, both.beside, LEAST, NEIGHBOURS + 4 * int(near.sum()), alone=False
-    )
-    rest = Pairs.together([pairs.where(~near), far])
+    rest, stuck = _pairs(both, tol), []
+    for other in found:
+        here = both if other is one else Together(other, frame)
+        rest, left = _told_apart(rest, here, np.asarray(other.change.offset - one.change.offset), alone=not more)
+        stuck.append(left)
     pieces = (both.charts[0].pieces, both.charts[1].pieces)
     findings = subdivided(both.charts, rest, tol)
     out = _own(assembled((one.a, one.b), (one.a, one.b), pieces, frame, tol, findings), one.change, b)
-    doubt = tuple(_boxes(stuck, one.change, b, a))
+    doubt = tuple(_boxes(Pairs.together(stuck), one.change, b, a))
     return replace(out, overlaps=overlaps(a, b, found, frame.size), unresolved=out.unresolved + doubt)
+
+
+def _on_common_lines(found: list[Coincidence], frame: Frame, tol: float) -> list[Coincidence]:
+    """Correspondences that differ by a shift, as across a seam, with the same cells; the first alone if there are none.
+
+    A closed surface has one correspondence before its seam and one behind.
+    """
+    one = found[0]
+    kin = [
+        x
+        for x in found
+        if x.change.swap == one.change.swap and np.abs(x.change.scale / one.change.scale - 1.0).max() <= 1e-9
+    ]
+    if len(kin) == 1:
+        return kin
+    a, b = one.a, one.b
+    for other in kin[1:]:
+        shift = one.change.offset - other.change.offset
+        a = a.insert_knots(*(lines_inside(other.a.breaks[k], a.breaks[k]) for k in (0, 1)))
+        b = b.insert_knots(*(lines_inside(other.b.breaks[k] + shift[k], b.breaks[k]) for k in (0, 1)))
+    out = []
+    for x in kin:  # b is in the first one's parameters now
+        shift = x.change.offset - one.change.offset
+        again = matched(a, b, Change(False, np.ones(2), shift), frame, tol)
+        if again is not None:
+            out.append(replace(again, change=x.change))
+    same = all(
+        len(p) == len(q)
+        for x in out
+        for side in ("a", "b")
+        for p, q in zip(getattr(x, side).breaks, getattr(out[0], side).breaks, strict=True)
+    )
+    return out if len(out) == len(kin) and same else [one]
+
+
+def _pairs(both: Together, tol: float) -> Pairs:
+    """All pairs of pieces whose boxes meet."""
+    boxes = []
+    for chart in both.charts:
+        points = chart.pieces.nets[..., :3] / chart.pieces.nets[..., 3:]
+        boxes.append((points.min(axis=(1, 2)), points.max(axis=(1, 2)) + tol))
+    (low_a, high_a), (low_b, high_b) = boxes
+    kp, kq = np.nonzero((low_a[:, None] <= high_b).all(axis=2) & (low_b <= high_a[:, None]).all(axis=2))
+    return Pairs(both.charts[0].cell(kp), both.charts[1].cell(kq), kp, kq, np.zeros((kp.size, 2)))
+
+
+def _told_apart(pairs: Pairs, both: Together, offset: Array, *, alone: bool) -> tuple[Pairs, Pairs]:
+    """(ordinary, stuck): pairs without those explained beside the region in which the surfaces are one.
+
+    Parameters
+    ----------
+    offset : of this correspondence's parameters of b from the pairs'
+    alone : whether it is the only one, which then goes round closed surfaces
+    """
+    turns = [{0.0, *(s * c.period[axis] for c in both.charts for s in (-1.0, 1.0) if alone)} for axis in (0, 1)]
+    left = np.ones(len(pairs), dtype=bool)
+    near = []
+    for shift in itertools.product(*turns):
+        moved = replace(pairs, q=pairs.q + np.repeat(offset + shift, 2), shift=pairs.shift + np.array(shift))
+        at = np.flatnonzero(touching(moved, both.slack))
+        at = at[both.beside(moved.where(at))]
+        near.append(moved.where(at))
+        left[at] = False
+    beside = Pairs.together(near)
+    far, stuck = told_apart(beside, both.explained, both.beside, LEAST, NEIGHBOURS + 4 * len(beside), alone=False)
+    back = np.repeat(offset, 2)
+    far, stuck = (replace(x, q=x.q - back) for x in (far, stuck))
+    return Pairs.together([pairs.where(left), far]), stuck
 
 
 def _boxes(stuck: Pairs, change: Change, b: NurbsSurface, a: NurbsSurface) -> list[Unresolved]:

@@ -13,10 +13,9 @@ import numpy as np
 
 from patchwright.models.arrays import Array, BoolArray, IntArray
 from patchwright.models.errors import ParameterError
-from patchwright.models.nurbs_surface import NurbsSurface
 from patchwright.models.surface import Surface
 from patchwright.ssi.bezier_pieces import Frame
-from patchwright.ssi.chart import Chart, local, restricted
+from patchwright.ssi.chart import Chart, local, restricted, spanned
 from patchwright.ssi.intersection import Intersection, Unresolved
 from patchwright.ssi.neighbours import TOUCH, Pairs, apart_at_pole, apart_on, told_apart, touching
 from patchwright.ssi.pair_findings import subdivided
@@ -24,7 +23,6 @@ from patchwright.ssi.pinch import ball_of, metric_of, one_curve, pinches
 from patchwright.ssi.singular_points import Ball, grouped
 from patchwright.ssi.surface_surface import assembled
 
-SPANS = 4  # at least so many in a closed direction: then pieces touch in one way only
 NEAR = 8.0  # sizes of an undecided box within which curves are taken to run into it
 LEAST = 1e-4  # of a piece: neighbours are not split below
 NEIGHBOURS = 4_000  # pairs of neighbours tested beyond four for each pair of pieces
@@ -44,7 +42,7 @@ def intersect_itself(surface: Surface, tolerance: float) -> Intersection:
     """
     if not tolerance > 0.0:
         raise ParameterError(f"the tolerance must be positive, got {tolerance}")
-    native = _spanned(surface.to_nurbs().clamped())
+    native = spanned(surface.to_nurbs().clamped())
     frame = Frame.of(native)
     chart = Chart.of(native, frame)
     tol = max(tolerance / frame.size, 2e-14)
@@ -121,18 +119,6 @@ def _clusters(stuck: Pairs, chart: Chart) -> tuple[Unresolved, ...]:
         )
         out.append(Unresolved(box, box, "whether the surface folds onto itself here is not decided"))
     return tuple(out)
-
-
-def _spanned(surface: NurbsSurface) -> NurbsSurface:
-    """The surface with at least four spans in a closed direction."""
-    more: list[Array] = []
-    net = surface.control_points
-    size = float(np.ptp(net.reshape(-1, 3), axis=0).max())
-    for axis, breaks in enumerate(surface.breaks):
-        rows = np.moveaxis(net, axis, 0)
-        parts = -(-SPANS // (breaks.size - 1)) if np.abs(rows[0] - rows[-1]).max() <= 1e-9 * size else 1
-        more.append(np.sort(np.linspace(breaks[:-1], breaks[1:], parts + 1)[1:-1].ravel()))
-    return surface.insert_knots(*more)
 
 
 def _pairs(chart: Chart, tol: float) -> tuple[Pairs, Pairs]:

@@ -146,3 +146,39 @@ def test_what_does_not_correspond_affinely_is_handed_back() -> None:
     found = intersect(plain, NurbsSurface(bent.degree, bent.knots, points))
     assert not found.complete
     assert any("coincide" in u.reason for u in found.unresolved)
+
+
+def ring(u: tuple[float, float] = (0.0, 1.0)) -> NurbsSurface:
+    """A bent tube, closed in v by C2 periodic cubics of eight spans, which is no analytic surface."""
+    t, angle = np.linspace(0.0, 1.0, 5), 2.0 * np.pi * np.arange(8) / 8.0
+    axis = np.stack([t, 0.4 * t * t, 0.1 * np.sin(3.0 * t)], axis=-1)
+    radius = (0.2 + 0.05 * np.cos(3.0 * t))[:, None] * (1.0 + 0.1 * np.cos(2.0 * angle))
+    x = axis[:, None] + np.stack([0.0 * radius, radius * np.cos(angle), radius * np.sin(angle)], axis=-1)
+    values, times = ([0.0, 0.5, 1.0], np.linspace(0.0, 1.0, 9)), ([4, 1, 4], [1] * 9)
+    return NurbsSurface.from_periodic((3, 3), values, times, x, periodic=(False, True)).restricted(u)
+
+
+def turned(surface: NurbsSurface, start: float) -> NurbsSurface:
+    """The closed surface with its seam at another v, on [start, start + 1]."""
+    before, after = surface.split("v", start)
+    knots = np.concatenate([after.knots[1][:-1], before.knots[1][4:] + 1.0])
+    points = np.concatenate([after.control_points, before.control_points[:, 1:]], axis=1)
+    return NurbsSurface(surface.degree, (surface.knots[0], knots), points)
+
+
+def test_closed_surfaces_have_no_boundary_at_their_seams() -> None:
+    whole, part = ring(), ring((0.2, 0.7))
+    (region,) = checked(intersect(whole, part), whole, part)
+    assert len(region.boundary) == 2
+    assert all(c.closed for c in region.boundary)
+    (all_of_it,) = checked(intersect(whole, whole), whole, whole)
+    halves = [checked(intersect(whole, x), whole, x)[0].area for x in whole.split("u", 0.4)]
+    assert sum(halves) == pytest.approx(all_of_it.area, rel=1e-9)
+
+
+def test_a_patch_across_a_seam() -> None:
+    whole = ring()
+    part = turned(whole, 0.6).restricted((0.2, 0.7), (0.8, 1.3))
+    found = intersect(whole, part)
+    (region,) = checked(found, whole, part)
+    assert region.area == pytest.approx(intersect(part, part).overlaps[0].area, rel=1e-9)
