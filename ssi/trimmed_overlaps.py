@@ -108,8 +108,8 @@ def _lifted(overlap: Overlap, plane: Plane, trims: Sequence[NurbsCurve], side: i
         if affine is not None:
             other = NurbsCurve(uv.degree, uv.knots, net @ affine[:2] + affine[2], uv.weights)
         points = space(divided(space.breaks, 2))
-        images = (uv, other) if side == 0 else (other, uv)
-        out.append(IntersectionCurve(space, *images, points, "overlap-boundary", False, 0.0, overlap.surfaces))
+        on_a, on_b = (uv, other) if side == 0 else (other, uv)
+        out.append(IntersectionCurve(space, on_a, on_b, points, "overlap-boundary", False, 0.0, overlap.surfaces))
     return out
 
 
