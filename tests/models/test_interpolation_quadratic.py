@@ -1,5 +1,7 @@
 """Quadratic interpolation by maxima: the paper's knots, degenerate sites, energies, and the linear system."""
 
+import time
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -123,6 +125,24 @@ def test_any_sites_give_simple_knots_between_their_sites_and_a_curve(seed, ends)
     made = interpolated(P, "quadratic-maxima", ends=ends)
     assert np.abs(made.curve(s) - P).max() <= 1e-10 * np.abs(P).max()
     assert np.unique(made.curve.knots[3:-3]).size == made.curve.knots[3:-3].size
+
+
+def test_twelve_spans_take_milliseconds_and_a_step_costs_as_much_for_every_site():
+    def seconds(work):
+        start = time.process_time()
+        return work(), time.process_time() - start
+
+    rng = np.random.default_rng(7)
+    P = np.cumsum(rng.uniform(0.05, 1.0, 1001)[:, None] * rng.normal(size=(1001, 2)), axis=0)
+    interpolate(P[:13], "quadratic-maxima")  # compiled and warm
+    assert min(seconds(lambda: interpolate(P[:13], "quadratic-maxima"))[1] for _ in range(3)) < 0.01
+    assert seconds(lambda: interpolate(P, "quadratic-maxima"))[1] < 1.0
+    costs = []
+    for n in (200, 1600):
+        sites = np.cumsum(rng.uniform(0.7, 1.0, n))
+        found, took = seconds(lambda sites=sites: maxima_knots(sites))
+        costs.append(took / (n * found.steps))
+    assert costs[1] < 3.0 * costs[0]
 
 
 def test_moving_and_scaling_the_sites_moves_and_scales_the_knots():
