@@ -11,6 +11,7 @@ from patchwright.models.surface import Surface
 from patchwright.ssi.bezier_pieces import BezierPieces, Frame
 from patchwright.ssi.intersection import CurveKind
 
+ROUND_OFF = 1e-13  # of the size: ends nearer than this meet
 SAME = 1e-7  # of the size or the parameter range: ends nearer than this are one point
 
 
@@ -203,26 +204,36 @@ def joined(arcs: list[Arc], scale: Array) -> list[Arc]:
                 closed = after == start
                 break
             end = after
-        out.append(_chained(chain, closed))
+        out.append(_chained(chain, closed, float(scale[0])))
     return out
 
 
-def _chained(chain: list[Arc], closed: bool) -> Arc:
+def _chained(chain: list[Arc], closed: bool, size: float) -> Arc:
+    """One branch of arcs; where pairs of pieces meet at a corner, a short piece spans what lies on the fourth pair."""
     if len(chain) == 1:
         return replace(chain[0], closed=closed)
     jets, lengths = [chain[0].jets], [chain[0].lengths]
     breaks: list[Array] = [np.ones(chain[0].jets.shape[0])]
     for arc in chain[1:]:
-        last = jets[-1][-1]
-        first = arc.jets[0]
-        gap = np.abs(first[1] - last[1]).max()
-        breaks[-1][-1] = 1.0 if gap <= 1e-8 * (1.0 + np.abs(last[1]).max()) else 0.0
+        last, first = jets[-1][-1], arc.jets[0]
+        smooth = np.abs(first[1] - last[1]).max() <= 1e-8 * (1.0 + np.abs(last[1]).max())
+        breaks[-1][-1] = float(smooth)
+        # a joint is stored twice, with a piece of no length between: each side keeps its own derivatives
+        lengths += [_between(last, first, size), arc.lengths]
         jets.append(arc.jets)
-        lengths.append(arc.lengths)
         breaks.append(np.ones(arc.jets.shape[0]))
-    # a joint is stored twice, with a piece of no length between: each side keeps its own derivatives
-    parts = [lengths[0]]
-    for more in lengths[1:]:
-        parts += [np.zeros(1), more]
+        breaks[-1][0] = float(smooth)
+    span = _between(jets[-1][-1], jets[0][0], size)
+    if closed and span[0] > 0.0:
+        lengths.append(span)
+        jets.append(jets[0][:1])
+        breaks[-1][-1] = 0.0
+        breaks.append(np.ones(1))
     ends = (chain[0].ends[0], chain[-1].ends[1])
-    return Arc(np.concatenate(jets), np.concatenate(parts), ends, chain[0].kind, closed, np.concatenate(breaks))
+    return Arc(np.concatenate(jets), np.concatenate(lengths), ends, chain[0].kind, closed, np.concatenate(breaks))
+
+
+def _between(last: Array, first: Array, size: float) -> Array:
+    """(1,) the length of the piece from the end of an arc to the beginning of the next, 0 where they meet."""
+    gap = first[0, :3] - last[0, :3]
+    return np.array([float(np.linalg.norm(gap)) if gap @ last[1, :3] > ROUND_OFF * size else 0.0])
