@@ -70,7 +70,7 @@ def surface_parameters(
         a, b = np.broadcast_arrays(a, b)
     except ValueError as error:
         raise ParameterError(f"shares along u {a.shape} and along v {b.shape} make no grid") from error
-    along_u, along_v = _Direction.of(surface, 0), _Direction.of(surface, 1)
+    along_u, along_v = (_Direction.of(surface, axis, accuracy) for axis in (0, 1))
     flat_a, flat_b = a.ravel(), b.ravel()
     u, v = np.empty_like(flat_a), np.empty_like(flat_a)
     todo = np.arange(flat_a.shape[0])
@@ -107,10 +107,10 @@ class _Direction(NamedTuple):
     size: float
 
     @classmethod
-    def of(cls, surface: NurbsSurface, axis: int) -> _Direction:
+    def of(cls, surface: NurbsSurface, axis: int, accuracy: float) -> _Direction:
         across = divided(surface.breaks[1 - axis], 2)
         curves = [surface.iso_curve("u" if axis == 0 else "v", float(t)) for t in across]
-        knots = np.unique(np.concatenate([ArcLength.of(curve).knots for curve in curves]))
+        knots = np.unique(np.concatenate([ArcLength.of(curve, 0.1 * accuracy).knots for curve in curves]))
         net = surface.control_points.reshape(-1, 3)
         return cls(surface, axis, knots, float(np.linalg.norm(np.ptp(net, axis=0))))
 
