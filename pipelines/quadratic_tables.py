@@ -121,7 +121,7 @@ def polygons() -> dict[str, tuple[Array, str]]:
     1 has chords whose centripetal parameters are the printed ones, along a gentle wave; 2 lies on an ellipse and 3 on a
     spiral, short and long steps in turn; 4 has the printed chords 1, 1, 2, 1, 1, whose printed parameters are those of
     the chord length and not, as the text has it, centripetal. They were chosen for what the paper claims to show on its
-    own: that maxima have less energy than midpoints, which random polygons mostly do not.
+    own: that maxima have less energy than midpoints, which holds on about half of random polygons.
     """
     wave = _walk(1000.0 * np.diff(SITES) ** 2, 1.1 * np.cos(0.5 * np.arange(12)))
     two, three = _in_turn(2.0), _in_turn(2.5)
