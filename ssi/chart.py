@@ -132,7 +132,7 @@ def parallel_free(a: list[Array], b: list[Array]) -> BoolArray:
     (s0, s1), (r0, r1) = ranges
     with np.errstate(invalid="ignore", over="ignore"):
         worst = np.max([s0 * r0, s0 * r1, s1 * r0, s1 * r1], axis=0)
-    return good & np.isfinite(worst) & (worst < 1.0 - CLEAR)
+    return np.asarray(good & np.isfinite(worst) & (worst < 1.0 - CLEAR))
 
 
 def independent(families: tuple[list[Array], list[Array], list[Array]]) -> BoolArray:
@@ -207,7 +207,7 @@ def product(f: Array, g: Array) -> Array:
         n, m = x.shape[1:3]
         rows = np.array([math.comb(n - 1, i) for i in range(n)], dtype=float)
         columns = np.array([math.comb(m - 1, j) for j in range(m)], dtype=float)
-        return x * (rows[:, None] * columns)[..., None]
+        return np.asarray(x * (rows[:, None] * columns)[..., None])
 
     f, g = scaled(f), scaled(g)
     out = np.zeros((f.shape[0], p + r + 1, q + s + 1, max(f.shape[3], g.shape[3])))

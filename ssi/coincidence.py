@@ -124,8 +124,8 @@ def shared_points(a: NurbsSurface, b: NurbsSurface, frame: Frame, tol: float) ->
 
 def _change(a: NurbsSurface, b: NurbsSurface, uv: Array, st: Array, frame: Frame, tol: float) -> Change | None:
     """The affine change of parameters near a common point; None where iso-curves do not run along each other."""
-    J = np.stack((a(*uv, (1, 0)), a(*uv, (0, 1))), axis=1)
-    K = np.stack((b(*st, (1, 0)), b(*st, (0, 1))), axis=1)
+    J = np.stack((a(uv[0], uv[1], (1, 0)), a(uv[0], uv[1], (0, 1))), axis=1)
+    K = np.stack((b(st[0], st[1], (1, 0)), b(st[0], st[1], (0, 1))), axis=1)
     rates, *_ = np.linalg.lstsq(J, K, rcond=None)  # (u, v) by (s, t)
     lengths = np.linalg.norm(J, axis=0)[:, None] * np.abs(rates) / np.maximum(np.linalg.norm(K, axis=0), 1e-300)
     if not np.isfinite(lengths).all() or np.linalg.norm(J @ rates - K) > ALIGNED * np.linalg.norm(K):
@@ -134,7 +134,7 @@ def _change(a: NurbsSurface, b: NurbsSurface, uv: Array, st: Array, frame: Frame
     off = lengths[[0, 1], [0, 1]] if swap else lengths[[0, 1], [1, 0]]
     if off.max() > 1e3 * ALIGNED:
         return None
-    scale = rates[[0, 1], [1, 0]] if swap else rates[[0, 1], [0, 1]]
+    scale = np.asarray(rates[[0, 1], [1, 0]] if swap else rates[[0, 1], [0, 1]], dtype=np.float64)
     rough = Change(swap, scale, uv - scale * (st[::-1] if swap else st))
     whole = [np.array(x.domain).T for x in (a, b)]
     near = [_span(x, at) for x, at in ((a, uv), (b, st))]

@@ -124,7 +124,7 @@ def _quarters(pairs: Pairs, alone: bool) -> Pairs:
         children.append(parts)
     p = np.repeat(children[0], 4, axis=1).reshape(-1, 4)
     q = np.tile(children[1], (1, 4, 1)).reshape(-1, 4)
-    out = Pairs(p, q, *(np.repeat(x, 16, axis=0) for x in (pairs.kp, pairs.kq, pairs.shift)))
+    out = Pairs(p, q, np.repeat(pairs.kp, 16), np.repeat(pairs.kq, 16), np.repeat(pairs.shift, 16, axis=0))
     if not alone:  # even the same boxes are of two surfaces
         return out
     first, second = np.tile(np.repeat(np.arange(4), 4), n), np.tile(np.arange(4), 4 * n)

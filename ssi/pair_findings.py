@@ -49,12 +49,12 @@ def subdivided(charts: tuple[Chart, Chart], pairs: Pairs, tol: float) -> tuple[A
         if singular > MOST:
             spent = BUDGET
         which = group[rows[:, 2].astype(np.int64)]
-        for side, k, at, corner in ((a, pairs.kp, 1, (3, 11)), (b, pairs.kq, 2, (7, 13))):
-            rows[:, at] = k[which]
+        for side, k, column, corner in ((a, pairs.kp, 1, (3, 11)), (b, pairs.kq, 2, (7, 13))):
+            rows[:, column] = k[which]
             start, width = side[1][which], side[2][which]
-            box, w = corner
+            first, place = corner
             for axis in (0, 1):
-                for c in (box + 2 * axis, box + 2 * axis + 1, w + axis):
+                for c in (first + 2 * axis, first + 2 * axis + 1, place + axis):
                     rows[:, c] = start[:, axis] + width[:, axis] * rows[:, c]
         out.append(rows)
     return np.concatenate(out), left

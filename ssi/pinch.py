@@ -41,7 +41,7 @@ def metric_of(chart: Chart) -> Array:
     for axis in (0, 1):
         steps = np.linalg.norm(np.diff(nets, axis=1 + axis), axis=3).mean(axis=(1, 2)) * (nets.shape[1 + axis] - 1)
         speeds.append(float((steps / chart.pieces.width[:, axis]).mean()))
-    return 1.0 / np.maximum(np.array(speeds), 1e-300)
+    return np.asarray(1.0 / np.maximum(np.array(speeds), 1e-300))
 
 
 def one_curve(chart: Chart, pairs: Pairs, metric: Array) -> BoolArray:

@@ -94,7 +94,7 @@ def _barriers(stuck: Pairs, rows: Array, chart: Chart) -> list[Ball]:
         return []
     middle = 0.5 * (hull[:, ::2] + hull[:, 1::2])
     far = cKDTree(0.5 * (p + q)[close] / size).query(middle / size, p=np.inf)[0]
-    beside = stuck.where(far <= NEAR)
+    beside = stuck.where(np.asarray(far <= NEAR))
     out = []
     for k, box in zip(beside.kp, beside.hull, strict=True):
         net = restricted(chart.pieces.nets[[k]], *local(chart.cell(np.array([k])), box[None]))[0]
