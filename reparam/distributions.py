@@ -54,8 +54,8 @@ class Distribution:
         ------
         ParameterError : fewer than two points, an option it does not have or misses, steps that cannot be met.
         """
-        if isinstance(count, bool) or int(count) != count or count < 2:
-            raise ParameterError(f"a distribution needs a whole number of at least 2 points, got {count}")
+        if isinstance(count, bool) or not isinstance(count, (int, np.integer)) or count < 2:
+            raise ParameterError(f"a distribution needs a whole number of at least 2 points, got {count!r}")
         wrong = [f"has no option {name!r}" for name in options if name not in self.options]
         wrong += [f"needs the option {name!r}" for name in self.required if name not in options]
         if wrong:

@@ -116,6 +116,8 @@ def test_curvature_does_not_depend_on_the_unit(scale):
         ("hyperbolic", 5, {}, "there is no distribution"),
         ("uniform", 1, {}, "at least 2 points"),
         ("uniform", 2.5, {}, "whole number"),
+        ("uniform", float("nan"), {}, "whole number"),
+        ("uniform", "5", {}, "whole number"),
         ("uniform", 5, {"ratio": 2}, "no option 'ratio'"),
         ("tanh-both", 5, {}, "needs the option 'first'"),
         ("tanh-both", 5, {"first": 0.6, "last": 0.5}, "leave room"),
