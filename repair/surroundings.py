@@ -117,7 +117,7 @@ def surroundings(model: Assembly, domain: Domain | None = None) -> Surroundings:
     far: tuple[str, ...] = ()
     if domain.far_field is not None:
         for name in domain.far_field:
-            aside |= np.isin(mesh.tags, _tags(model, name, "far field"))
+            aside |= np.isin(_tagged(mesh), _tags(model, name, "far field"))
             reasons.append(f"{name} is far field: it was named so")
         far = domain.far_field
     planes = []
@@ -140,7 +140,7 @@ def surroundings(model: Assembly, domain: Domain | None = None) -> Surroundings:
         if len(outer):
             guessed = np.isin(pieces.label, outer)
             aside |= guessed
-            far = tuple(model.names[k] for k in np.unique(mesh.tags[guessed])) if mesh.tags is not None else ()
+            far = tuple(model.names[k] for k in np.unique(_tagged(mesh)[guessed]))
             reasons.append(f"{', '.join(far) or 'a piece'} taken for a far field: {reason}")
     if len(aside) and aside.all():
         raise ParameterError("everything is named far field or symmetry plane: no body is left to work on")
@@ -167,7 +167,7 @@ def pieces_of(mesh: Triangulation, distance: float) -> Pieces:
 
 def faces_of(mesh: Triangulation) -> Pieces:
     """The parts of a tagged triangulation that have triangles."""
-    return _boxed(mesh, np.unique(mesh.tags, return_inverse=True)[1].reshape(-1).astype(np.int64))
+    return _boxed(mesh, np.unique(_tagged(mesh), return_inverse=True)[1].reshape(-1).astype(np.int64))
 
 
 def _boxed(mesh: Triangulation, label: IntArray) -> Pieces:
@@ -215,6 +215,11 @@ def far_pieces(low: Array, high: Array) -> tuple[IntArray, str]:
     return outer.astype(np.int64), reason
 
 
+def _tagged(mesh: Triangulation) -> IntArray:
+    """(m,) the part each triangle of an assembly's triangulation belongs to."""
+    return np.zeros(len(mesh), dtype=np.int64) if mesh.tags is None else mesh.tags
+
+
 def _tags(model: Assembly, name: str, what: str) -> IntArray:
     """Indices of the parts with a name, or of the faces of a body with it."""
     own = [i for i, part in enumerate(model.parts) if name and name in (part.name, part.body)]
@@ -233,7 +238,7 @@ def _plane(model: Assembly, word: str) -> tuple[SymmetryPlane, BoolArray]:
     if word not in model.names and not any(word == part.body for part in model.parts):
         known = ", ".join((*AXES, *dict.fromkeys(n for n in model.names if n)))
         raise ParameterError(f"symmetry: {word!r} is neither x, y, z nor a part; known are {known}")
-    own = np.isin(mesh.tags, _tags(model, word, "symmetry"))
+    own = np.isin(_tagged(mesh), _tags(model, word, "symmetry"))
     corners = mesh.corners[own].reshape(-1, 3)
     if not len(corners):
         raise ParameterError(f"symmetry: part {word!r} has no triangles to take a plane from")

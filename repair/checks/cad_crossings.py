@@ -93,10 +93,11 @@ def _crossing(exam: Examination, mesh: Triangulation, pairs: IntArray, key: IntA
         return []
     which = np.unique(key, axis=0, return_inverse=True)[1].reshape(-1)
     curves = crossing_curves(mesh, pairs, which)
+    corners = mesh.corners
     found = []
     for k in range(int(which.max()) + 1):
         triangles = np.unique(pairs[which == k])
-        box = box_of(mesh.corners[triangles])
+        box = box_of(corners[triangles])
         size = float(np.linalg.norm(box[1] - box[0]))
         parts = exam.parts_of(triangles)
         faces = len(np.unique(exam.raw.tags[triangles])) if exam.raw.tags is not None else 1

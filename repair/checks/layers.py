@@ -114,11 +114,11 @@ def _found(
     links = local.reshape(-1, 2).astype(np.int64)
     label = region_labels(body.triangles[index], links)
     pair_label = label[links[:, 0]]
-    counts = np.bincount(label)
+    counts, corners = np.bincount(label), body.corners
     found = []
     for r in np.argsort(-counts, kind="stable")[:MOST_REGIONS]:
         triangles = index[label == r]
-        box = box_of(body.corners[triangles])
+        box = box_of(corners[triangles])
         heights = apart[pair_label == r]
         size = float(np.median(heights)) if kind == "gap" else float(np.linalg.norm(box[1] - box[0]))
         width = exam.length(float(np.median(heights)))

@@ -31,17 +31,18 @@ def facing_surfaces(exam: Examination) -> dict[int, Ahead]:
     wanted = [i for i, rim in enumerate(exam.rims) if rim.kind == "opening" and rim.closed and rim.overlaps is None]
     if not wanted or len(exam.component_closed) < 2:
         return {}
+    normals, corners = body.normals, body.corners  # computed anew each time they are asked for
     start, ahead, owner = [], [], []
     for i in wanted:
         rim = exam.rims[i]
         some = np.unique(np.linspace(0, len(rim.loop) - 1, SAMPLES).astype(np.int64))
         points = body.vertices[rim.loop]
         p, q = points[some], np.roll(points, -1, axis=0)[some]
-        outward = np.cross(q - p, body.normals[rim.triangles[some]])
+        outward = np.cross(q - p, normals[rim.triangles[some]])
         size = np.linalg.norm(outward, axis=1)
         good = size > 0.0
         start.append(0.5 * (p + q)[good])
-        ahead.append(_away(outward[good] / size[good, None], start[-1], body.corners[rim.triangles[some[good]]]))
+        ahead.append(_away(outward[good] / size[good, None], start[-1], corners[rim.triangles[some[good]]]))
         owner.append(np.full(int(good.sum()), i))
     origin, way, rim_of = np.concatenate(start), np.concatenate(ahead), np.concatenate(owner)
     reach = REACH * np.array([exam.rims[i].diameter for i in rim_of])
