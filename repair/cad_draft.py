@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,22 +18,32 @@ from patchwright.repair.result import Rung
 REACH_SHARE = 0.05  # of the diagonal: rims farther apart than this are no seam that came open
 RIM_SHARE = 0.5  # of a rim's own diagonal: a gap as wide as this is an opening
 ON_SHARE = 5e-7  # of the diagonal: an edge this near a surface lies on it; half of the widest seam that is closed
+LOOSE_SHARE = 1e-4  # of the diagonal: a shared edge whose surfaces are farther apart is taken apart
+SECONDS = 150.0  # after which the rungs begin nothing new
 FIT_SHARE = 1e-10  # of the diagonal: how near new edges and pcurves follow what they stand for
 
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """The lengths the rungs decide by, in the model's unit."""
+    """The lengths the rungs decide by, in the model's unit, and when (monotonic seconds) they are to end."""
 
     diagonal: float
     on: float
     fit: float
     reach: float
+    loose: float
+    until: float
 
     @classmethod
     def of(cls, diagonal: float) -> Limits:
         """The shares above of a diagonal."""
-        return cls(diagonal, ON_SHARE * diagonal, FIT_SHARE * diagonal, REACH_SHARE * diagonal)
+        shares = (1.0, ON_SHARE, FIT_SHARE, REACH_SHARE, LOOSE_SHARE)
+        return cls(*(share * diagonal for share in shares), until=time.monotonic() + SECONDS)
+
+    @property
+    def expired(self) -> bool:
+        """Whether the time is up."""
+        return time.monotonic() > self.until
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -53,15 +53,17 @@ def heal(model: Assembly, diagonal: float) -> Healed | None:
         return None
     limits = Limits.of(diagonal)
     start = Draft(model, welded(topology, 2.0 * limits.on), tuple(range(len(model.parts))))
-    draft, apart = opened(start, limits)
+    draft, apart, widest = opened(start, limits)
     before = _free(draft)
     if not before:
         return None
+    tried = 0
     for crossing in (True, False):
         mended, changes = _climbed(draft, limits, crossing)
-        if not changes:
+        if len(changes) in (0, tried):
             return None
-        made = _built(model, mended, limits)
+        tried = len(changes)
+        made = _built(model, mended, limits, max(2.0 * limits.on, widest))
         if made is not None:
             free = int((made.topology.use_counts() == 1).sum()) if made.topology else 0
             return Healed(made, np.array(mended.origin), changes, apart, before, free)
@@ -89,15 +91,18 @@ def _free(draft: Draft) -> int:
     return int((draft.topology.use_counts() == 1).sum())
 
 
-def _built(model: Assembly, draft: Draft, limits: Limits) -> Assembly | None:
-    """The draft as the kernel builds it, sewn where edges coincide but are not shared; None where it does not hold."""
+def _built(model: Assembly, draft: Draft, limits: Limits, widest: float) -> Assembly | None:
+    """The draft as the kernel builds it, sewn where edges coincide but are not shared; None where it does not hold.
+
+    It holds when no seam is wider than `widest`, no face lies on another, and no face has become invalid.
+    """
     try:
         made = rebuilt(model, draft.parts, compacted(draft.topology))
         if made.topology is not None and (made.topology.use_counts() == 1).any():
             sewn = sew(made, 2.0 * limits.on)
             if not sewn.dropped and sewn.surface_change.max(initial=0.0) <= 1e-12 * max(limits.diagonal, 1.0):
                 made = sewn.assembly
-        sound = all(s.gap <= 2.0 * limits.on and s.angle < FOLD for s in measure_seams(made))
+        sound = all(s.gap <= widest and s.angle < FOLD for s in measure_seams(made))
         was = set(brep_status(model).invalid)
         worse = [i for i in brep_status(made).invalid if i >= len(draft.origin) or draft.origin[i] not in was]
     except EngineError:

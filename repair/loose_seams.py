@@ -20,16 +20,17 @@ from patchwright.repair.cad_draft import Draft, Limits
 from patchwright.repair.pcurves import fitted
 
 
-def opened(draft: Draft, limits: Limits) -> tuple[Draft, int]:
-    """The draft with every edge taken apart whose surfaces are farther apart than a closed seam, and their number."""
+def opened(draft: Draft, limits: Limits) -> tuple[Draft, int, float]:
+    """The draft with every loose edge taken apart, their number, and the widest gap of the seams that stay.
+
+    A seam wider than a closed one but within `limits.loose` is the file's own precision: it is left as it came.
+    """
     topology = draft.topology
-    loose = {
-        seam.edge
-        for seam in measure_seams(replace(draft.assembly, topology=topology, native=None))
-        if seam.gap > 2.0 * limits.on and not is_point(topology.curves[seam.edge])
-    }
+    seams = measure_seams(replace(draft.assembly, topology=topology, native=None))
+    loose = {s.edge for s in seams if s.gap > limits.loose and not is_point(topology.curves[s.edge])}
+    widest = max((s.gap for s in seams if s.edge not in loose), default=0.0)
     if not loose:
-        return draft, 0
+        return draft, 0, widest
     curves: list[NurbsCurve] = []
     ends: list[tuple[Array, Array]] = []
     changed = {}
@@ -49,7 +50,7 @@ def opened(draft: Draft, limits: Limits) -> tuple[Draft, int]:
             rows.append(tuple(row))
         changed[face] = tuple(rows)
     wider = with_loops(with_edges(topology, curves, ends), changed)
-    return replace(draft, topology=compacted(welded(wider, 2.0 * limits.on))), len(loose)
+    return replace(draft, topology=compacted(welded(wider, 2.0 * limits.on))), len(loose), widest
 
 
 def _lifted(surface: Surface, pcurve: NurbsCurve, limits: Limits) -> NurbsCurve:

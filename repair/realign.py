@@ -42,12 +42,27 @@ class _Rims:
     owner: IntArray
     corners: Array
 
+    @property
+    def length(self) -> float:
+        """Of all edges, along their points."""
+        steps = np.diff(self.points.reshape(-1, SAMPLES, 3), axis=1)
+        return float(np.linalg.norm(steps, axis=2).sum())
+
     @classmethod
     def of(cls, draft: Draft, edges: list[int]) -> _Rims:
         curves = tuple(draft.topology.curves[e] for e in edges)
         points = np.stack([c(np.linspace(*c.domain, SAMPLES)) for c in curves])
         owner = np.repeat(np.arange(len(edges), dtype=np.int64), SAMPLES)
         return cls(curves, points.reshape(-1, 3), owner, points[:, [0, -1]].reshape(-1, 3))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Fit:
+    """A motion, and the share of a border that lies on others' to the residual after it."""
+
+    motion: RigidMotion
+    residual: float
+    share: float
 
 
 def realign(draft: Draft, limits: Limits) -> tuple[Draft, tuple[Change, ...]]:
@@ -58,33 +73,34 @@ def realign(draft: Draft, limits: Limits) -> tuple[Draft, tuple[Change, ...]]:
     group_of = {face: number for number, group in enumerate(groups) for face in group}
     largest = int(np.argmax(areas))
     changes: list[Change] = []
-    loose = [k for k in sorted(range(len(groups)), key=lambda i: areas[i]) if k != largest]
-    progress = True
-    while progress:  # a piece put back completes the hole of its neighbours
-        progress = False
-        for number in list(loose):
+    loose = [k for k in range(len(groups)) if k != largest]
+    while not limits.expired:  # a piece put back completes the holes of its neighbours
+        best: tuple[float, int, list[int], _Fit] | None = None
+        for number in loose:
             own = [e for e, f in owner.items() if group_of[f] == number]
             others = [e for e, f in owner.items() if group_of[f] != number]
-            moved = _motion(_Rims.of(draft, own), _Rims.of(draft, others), limits) if own and others else None
-            if moved is None:
+            if not own or not others or limits.expired:
                 continue
-            change, draft = _put_back(draft, groups[number], own, moved, limits)
-            changes.append(change)
-            loose.remove(number)
-            progress = True
+            rims = _Rims.of(draft, own)
+            fit = _motion(rims, _Rims.of(draft, others), limits)
+            # of two pieces that fit each other the one moves that has the longer border in place then
+            if fit is not None and (best is None or fit.share * rims.length > best[0]):
+                best = fit.share * rims.length, number, own, fit
+        if best is None:
+            break
+        change, draft = _put_back(draft, groups[best[1]], best[2], best[3], limits)
+        changes.append(change)
+        loose.remove(best[1])
     return draft, tuple(changes)
 
 
-def _put_back(
-    draft: Draft, faces: list[int], own: list[int], moved: tuple[RigidMotion, float, float], limits: Limits
-) -> tuple[Change, Draft]:
-    motion, residual, share = moved
-    draft, move = _applied(draft, faces, motion)
+def _put_back(draft: Draft, faces: list[int], own: list[int], fit: _Fit, limits: Limits) -> tuple[Change, Draft]:
+    draft, move = _applied(draft, faces, fit.motion)
     change = Change(
         "displaced face put back" if len(faces) == 1 else "displaced faces put back",
         Rung.REALIGN,
         tuple(faces),
-        f"{share:.0%} of its border lies on its neighbours' to {residual:.2g} after one rigid motion",
+        f"{fit.share:.0%} of its border lies on its neighbours' to {fit.residual:.2g} after one rigid motion",
         limits.on,
         move,
         _Rims.of(draft, own).points.mean(axis=0),
@@ -99,13 +115,15 @@ def _size(draft: Draft, face: int) -> float:
     return float(np.linalg.norm(np.ptp(points, axis=0)))
 
 
-def _motion(own: _Rims, others: _Rims, limits: Limits) -> tuple[RigidMotion, float, float] | None:
-    """The motion that lays most of `own` onto `others`, the residual there, and the share of `own` it holds for."""
+def _motion(own: _Rims, others: _Rims, limits: Limits) -> _Fit | None:
+    """The motion that lays most of `own` onto `others`; None where there is none or none is needed."""
     size = float(np.linalg.norm(np.ptp(own.points, axis=0)))
     reach = min(limits.reach, RIM_SHARE * size)
     centre = own.points.mean(axis=0)
     if float(np.median(apart(own.points, others.points))) > reach:
         return None
+    if (_nearest(others, own.points[::THIN])[1] <= limits.on).mean() >= MOST:
+        return None  # it is in place
     shifts = (others.corners[None] - own.corners[:, None]).reshape(-1, 3)
     shifts = shifts[np.linalg.norm(shifts, axis=1) <= reach]
     shifts = np.concatenate([np.zeros((1, 3)), shifts])
@@ -124,7 +142,7 @@ def _motion(own: _Rims, others: _Rims, limits: Limits) -> tuple[RigidMotion, flo
         far = _nearest(others, moved)[1]
         fits = far <= limits.on
         if fits.mean() >= MOST and np.linalg.norm(moved - own.points, axis=1).max() <= reach:
-            return motion, float(far[fits].max()), float(fits.mean())
+            return _Fit(motion, float(far[fits].max()), float(fits.mean()))
     return None
 
 

@@ -38,12 +38,13 @@ def retrim(draft: Draft, limits: Limits, *, crossing: bool = True) -> tuple[Draf
     surface are taken.
     """
     changes: list[Change] = []
-    while True:
+    while not limits.expired:
         step = _next(draft, limits, crossing)
         if step is None:
-            return draft, tuple(changes)
+            break
         draft, change = step
         changes.append(change)
+    return draft, tuple(changes)
 
 
 def _next(draft: Draft, limits: Limits, cross: bool) -> tuple[Draft, Change] | None:
