@@ -62,7 +62,7 @@ def welded(mesh: Triangulation) -> Triangulation:
 def trimesh(dirty: Triangulation, name: str) -> Triangulation:
     import trimesh as tool
 
-    mesh = tool.Trimesh(dirty.vertices, dirty.triangles, process=True)
+    mesh = tool.Trimesh(np.array(dirty.vertices), np.array(dirty.triangles), process=True)
     mesh.update_faces(mesh.unique_faces())
     mesh.update_faces(mesh.nondegenerate_faces())
     tool.repair.fix_normals(mesh)
@@ -119,13 +119,13 @@ Tool = Callable[[Triangulation, str], Triangulation]
 TOOLS: dict[str, tuple[str, Tool]] = {
     "patchwright": ("patchwright", patchwright),
     "patches": ("patchwright", fitted),
-    "trimesh": ("trimesh", trimesh),
+    "trimesh": ("trimesh networkx", trimesh),
     "pymeshfix": ("pymeshfix", pymeshfix),
     "alpha wrap": ("pymeshlab", alpha_wrap),
     "manifold3d": ("manifold3d", manifold3d),
     "trueform": ("trueform", trueform),
 }
-"""Per column the package it needs and what it does."""
+"""Per row the packages it needs and what it does."""
 
 
 def judge(case: DefectCase, result: Triangulation) -> Facts:
@@ -197,10 +197,10 @@ def row(tool: str, shape: str, seed: int, size: float) -> None:
         print("ROW " + json.dumps([name, found]), flush=True)
 
 
-def installed(package: str) -> bool:
+def installed(packages: str) -> bool:
     from importlib.util import find_spec
 
-    return find_spec(package) is not None
+    return all(find_spec(package) is not None for package in packages.split())
 
 
 def main() -> None:
