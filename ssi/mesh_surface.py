@@ -1,7 +1,7 @@
 """Intersection of a triangulation with a surface: every arc, every point of touch, and boxes where doubt remains.
 
 Method. The surface falls into Bezier pieces; they are halved until every pair of a box and a triangle is excluded or
-explained (`_mesh_surface_kernel`): so existence and completeness come from bounds, not from samples. Arcs are joined
+explained (`_triangle_box_kernel`): so existence and completeness come from bounds, not from samples. Arcs are joined
 end to end (`mesh_surface_arcs`) and become cubics in the planes of the triangles (`plane_cubics`). A plane is a mesh of
 two triangles and goes to the exact predicates (`mesh_plane`).
 
@@ -24,7 +24,7 @@ from patchwright.models.triangulation import Triangulation
 from patchwright.ssi.bezier_pieces import BezierPieces, Frame
 from patchwright.ssi.intersection import Box, Contact, Intersection, IntersectionCurve, Unresolved
 from patchwright.ssi.mesh_plane import intersect_mesh_plane
-from patchwright.ssi.mesh_surface_arcs import Arcs, joined, loose_ends
+from patchwright.ssi.mesh_surface_arcs import Arcs, joined, loose_ends, places
 from patchwright.ssi.plane_cubics import on_surface
 
 BUDGET = 4_000_000  # pairs of a box and a triangle judged; about a microsecond each
@@ -132,7 +132,7 @@ def _unresolved(
     rows: Array, mesh: Triangulation, surface: Surface, pieces: BezierPieces, curves: tuple[IntersectionCurve, ...]
 ) -> list[Unresolved]:
     """The boxes handed back, each with its triangle; those along curves of touch are explained."""
-    from patchwright.ssi import _mesh_surface_kernel as kernel
+    from patchwright.ssi import _triangle_box_kernel as kernel
 
     out: list[Unresolved] = []
     touch = [c for c in curves if c.kind == "tangential"]
@@ -177,15 +177,26 @@ def _contacts(
 ) -> tuple[Contact, ...]:
     """Points of touch among triangles, parameters and points, each place once, without those on curves."""
     triangle, uv, points = near
-    gap = np.array([
-        Tree.of(mesh.take([t])).closest(p[None]).distance[0] for t, p in zip(triangle.tolist(), points, strict=True)
-    ])  # fmt: skip
+    gap = _from_triangles(points, mesh.corners[triangle])
+    off = gap <= 2.0 * tolerance
+    for c in curves:
+        off[off] = c.curve.closest(points[off]).distance > 10.0 * reach
+    uv, points, gap = uv[off], points[off], gap[off]
+    place = places(points, 100.0 * reach)[0]
     out: list[Contact] = []
-    for i in np.argsort(gap, kind="stable").tolist():
-        p = points[i]
-        if gap[i] > 2.0 * tolerance or any(np.linalg.norm(c.point - p) <= 100.0 * reach for c in out):
-            continue
-        if any(float(c.curve.closest(p[None]).distance[0]) <= 10.0 * reach for c in curves):
-            continue
-        out.append(Contact(p, None, (float(uv[i, 0]), float(uv[i, 1])), "touch", float(gap[i])))
+    for k in range(int(place.max(initial=-1)) + 1):
+        some = np.flatnonzero(place == k)
+        i = some[np.argmin(gap[some])]
+        out.append(Contact(points[i], None, (float(uv[i, 0]), float(uv[i, 1])), "touch", float(gap[i])))
     return tuple(out)
+
+
+def _from_triangles(points: Array, corners: Array) -> Array:
+    """(n,) distance of each point from its own triangle (n, 3, 3)."""
+    heights = np.einsum("mki,mi->mk", _planes(corners)[..., :3], points) + _planes(corners)[..., 3]
+    way = np.roll(corners, -1, axis=1) - corners
+    away = points[:, None] - corners
+    share = np.clip(np.einsum("mki,mki->mk", away, way) / np.einsum("mki,mki->mk", way, way), 0.0, 1.0)
+    sides = np.linalg.norm(away - share[..., None] * way, axis=2).min(axis=1, initial=np.inf)
+    inside = (heights[:, 1:] >= 0.0).all(axis=1)
+    return np.asarray(np.where(inside, np.abs(heights[:, 0]), sides))

@@ -47,7 +47,7 @@ class Arcs:
     @classmethod
     def of(cls, rows: Array, mesh: Triangulation, surface: Surface, pieces: BezierPieces) -> Arcs:
         """The arcs among the kernel's findings."""
-        from patchwright.ssi import _mesh_surface_kernel as kernel
+        from patchwright.ssi import _triangle_box_kernel as kernel
 
         some = rows[rows[:, 0] == kernel.ARC]
         along = np.flatnonzero(some[:, 14] != kernel.BORDER)
@@ -84,7 +84,7 @@ class Arcs:
         cls, rows: Array, mesh: Triangulation, surface: Surface, pieces: BezierPieces, points: IntArray, arcs: Arcs
     ) -> tuple[IntArray, Array, Array]:
         """Triangles, parameters and points where the surface may touch: the kernel's, and arcs that are points."""
-        from patchwright.ssi import _mesh_surface_kernel as kernel
+        from patchwright.ssi import _triangle_box_kernel as kernel
 
         some = rows[(rows[:, 0] == kernel.POINT) | (rows[:, 0] == kernel.TOUCH)]
         uv = cls.parameters(surface, pieces, some[:, 2].astype(np.int64), some[:, 8:10])
@@ -114,7 +114,7 @@ def joined(arcs: Arcs, reach: float) -> tuple[Chains, IntArray]:
 
     Points where other than two arcs end, end curves.
     """
-    place, points = _places(arcs.ends.reshape(-1, 3), reach)
+    place, points = places(arcs.ends.reshape(-1, 3), reach)
     place = place.reshape(-1, 2)
     length = np.linalg.norm(arcs.ends[:, 1] - arcs.ends[:, 0], axis=1)
     keep = np.flatnonzero((place[:, 0] != place[:, 1]) | (length > 4.0 * reach))
@@ -135,7 +135,7 @@ def joined(arcs: Arcs, reach: float) -> tuple[Chains, IntArray]:
     return Chains(traced.offsets, ordered, way(place), traced.closed), points_only
 
 
-def _places(points: Array, reach: float) -> tuple[IntArray, Array]:
+def places(points: Array, reach: float) -> tuple[IntArray, Array]:
     """Which place each point is, places in lexicographic order, and a point of each."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
@@ -162,6 +162,8 @@ def loose_ends(arcs: Arcs, chains: Chains, mesh: Triangulation, surface: Surface
         return []
     uses = np.bincount(chains.place.reshape(-1))
     rows, column = np.nonzero(uses[chains.place] == 1)
+    if not len(rows):
+        return []
     low, high = np.array(surface.domain).T
     uv = chains.arcs.uv[rows, column]
     rim = RIM * (high - low)
