@@ -19,6 +19,7 @@ from patchwright.ssi.singular_points import Ball
 
 ARCS = 48  # parts of the half turn of t
 REACH = 0.06  # of the size: half the distance of p and q at which a curve is led to the pinch point
+OUTSIDE = 1.3  # times that: where a curve is looked for
 NODES = 9  # radii at which the curve is solved
 STEPS = 5  # pieces of the curve inside
 NEWTON = 30
@@ -191,6 +192,25 @@ def ball_of(pinch: Pinch) -> Ball:
         return np.concatenate((jets, nodes[1:])), np.concatenate((lengths, more))
 
     return Ball(centre, radius, "pinch", 0.0, (), lead=lead)
+
+
+def seed_of(pinch: Pinch) -> Array:
+    """(1, ROW) a finding on the curve just outside the ball; none where it is not on the surface."""
+    from patchwright.ssi._subdivision_kernel import ROW, TRANSVERSAL
+
+    chart = pinch.chart
+    (x, e, m), _ = _solved(pinch, OUTSIDE * REACH)
+    row = np.zeros((1, ROW))
+    row[0, 0] = TRANSVERSAL
+    for side, uv in enumerate((m[:2] + e[:2], m[:2] - e[:2])):
+        at = [int(np.searchsorted(t, w, "right")) - 1 for t, w in zip(chart.breaks, uv, strict=True)]
+        if any(not 0 <= k < n for k, n in zip(at, chart.pieces.shape, strict=True)):
+            return row[:0]
+        k = at[0] * chart.pieces.shape[1] + at[1]
+        row[0, 1 + side] = k
+        row[0, 11 + 2 * side : 13 + 2 * side] = (uv - chart.pieces.low[k]) / chart.pieces.width[k]
+    row[0, 15:18] = x
+    return row
 
 
 def _solved(pinch: Pinch, r: float, guess: Array | None = None) -> tuple[Array, Array]:

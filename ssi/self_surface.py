@@ -2,7 +2,11 @@
 
 Pairs of pieces that touch in the parameters are told apart by the directions of their derivatives (`chart`,
 `neighbours`); all others are pairs of two surfaces for subdivision and tracing. Seams and poles are neighbourhoods like
-any other and no contacts. Every curve is found once in each order of its two parameter curves, and kept once.
+any other and no contacts. Every curve is found once in each order of its two parameter curves, and kept once. Curves
+that end inside the surface end at pinch points (`pinch`).
+
+Limits: cusp edges, pinch points on a knot line or of rational surfaces, and lines inside the domain that shrink to a
+point are handed back as undecided boxes; curves end where they run into these.
 """
 
 from __future__ import annotations
@@ -19,7 +23,7 @@ from patchwright.ssi.chart import Chart, local, restricted, spanned
 from patchwright.ssi.intersection import Intersection, Unresolved
 from patchwright.ssi.neighbours import TOUCH, Pairs, apart_at_pole, apart_on, told_apart, touching
 from patchwright.ssi.pair_findings import subdivided
-from patchwright.ssi.pinch import ball_of, metric_of, one_curve, pinches
+from patchwright.ssi.pinch import ball_of, metric_of, one_curve, pinches, seed_of
 from patchwright.ssi.singular_points import Ball, grouped
 from patchwright.ssi.surface_surface import assembled
 
@@ -69,7 +73,9 @@ def intersect_itself(surface: Surface, tolerance: float) -> Intersection:
     apart, stuck = told_apart(near, explained, stays, LEAST, NEIGHBOURS + 4 * len(near))
     findings = subdivided((chart, chart), Pairs.together([far, apart]), tol)
     two = (chart.pieces, chart.pieces)
-    pinched = [ball_of(x) for x in pinches(chart, Pairs.together(ends), metric)] if ends else []
+    points = pinches(chart, Pairs.together(ends), metric) if ends else []
+    findings = np.concatenate((findings[0], *(seed_of(x) for x in points))), findings[1]
+    pinched = [ball_of(x) for x in points]
     pinched += _barriers(stuck, findings[0], chart)
     found = assembled((surface, surface), (native, native), two, frame, tol, findings, alone=True, pinches=pinched)
     if not len(stuck):

@@ -32,7 +32,7 @@ from patchwright.ssi.following import Ground, crossing_arcs, touching_arcs
 from patchwright.ssi.intersection import Box, Contact, Intersection, Unresolved
 from patchwright.ssi.pair_findings import BUDGET, SMALL
 from patchwright.ssi.singular_points import Ball, balls_of
-from patchwright.ssi.two_orders import both_ways, one_of_each, swapped
+from patchwright.ssi.two_orders import both_ways, completed, one_of_each, swapped
 
 if TYPE_CHECKING:
     from patchwright.models.nurbs_surface import NurbsSurface
@@ -139,7 +139,7 @@ class _Work:
         for code, follow in ((TRANSVERSAL, crossing_arcs), (TANGENT, touching_arcs)):
             seeds = self.rows[self.codes == code]
             arcs, stuck = follow(np.concatenate((seeds, swapped(seeds))) if self.alone else seeds, balls, self.ground)
-            found = joined(arcs, self.ground.scale)
+            found = joined(completed(arcs, self.ground.scale) if self.alone else arcs, self.ground.scale)
             branches += one_of_each(found, self.ground.scale) if self.alone else found
             for at, which in stuck:
                 self._stuck(at, which)

@@ -26,6 +26,17 @@ def both_ways(ball: Ball) -> Ball:
     return replace(ball, places=ball.places + other)
 
 
+def completed(arcs: list[Arc], scale: Array) -> list[Arc]:
+    """The arcs in both orders, where one of two was taken for a repeat of the other."""
+    dense = [_dense(arc) / scale for arc in arcs]
+    out = list(arcs)
+    for arc in arcs:
+        probe = (arc.jets[arc.jets.shape[0] // 2, 0] / scale)[TURNED]
+        if not any(_on(probe, other) for other in dense):
+            out.append(replace(arc, jets=arc.jets[:, :, TURNED]))
+    return out
+
+
 def one_of_each(arcs: list[Arc], scale: Array) -> list[Arc]:
     """One of each two arcs that differ in the order of their parameters only.
 

@@ -80,8 +80,26 @@ def test_a_looped_sheet_crosses_itself_in_a_line(scale: float) -> None:
     assert ends == pytest.approx([0.25, 0.75], abs=1e-9)
 
 
-def test_a_curve_ends_at_a_pinch_point() -> None:
-    surface = polynomial(umbrella, (3, 1))
+def test_knot_lines_do_not_matter() -> None:
+    """Along one of them, u = 1/4, the curve runs."""
+    surface = polynomial(loop, (3, 3)).insert_knots([0.25, 0.5], [0.3])
+    (curve,) = checked(intersect(surface), surface).curves
+    assert curve.curve.length() == pytest.approx(1.0, rel=1e-9)
+
+
+def test_a_part_of_a_looped_sheet_overlaps_the_sheet_and_is_crossed_by_it() -> None:
+    surface = polynomial(loop, (3, 3))
+    found = intersect(surface, surface.restricted((0.1, 0.4), (0.2, 0.9)))
+    assert found.complete
+    assert len(found.overlaps) == 1
+    (curve,) = found.curves
+    assert curve.kind == "transversal"
+    assert curve.curve.length() == pytest.approx(0.7, rel=1e-9)
+
+
+@pytest.mark.parametrize("knots", [((), ()), ((0.31, 0.7), (0.2, 0.6))], ids=["one piece", "nine pieces"])
+def test_a_curve_ends_at_a_pinch_point(knots: tuple[tuple[float, ...], tuple[float, ...]]) -> None:
+    surface = polynomial(umbrella, (3, 1)).insert_knots(*knots)
     (curve,) = checked(intersect(surface), surface).curves
     assert curve.curve.length() == pytest.approx(0.6 * math.sqrt(2.0), rel=1e-9)
     assert curve.uv_a is not None
