@@ -20,9 +20,11 @@ from patchwright.models.triangulation import Triangulation
 from patchwright.repair.cad_draft import Change
 from patchwright.repair.cad_grid import cad_grid
 from patchwright.repair.cad_heal import Healed, heal
+from patchwright.repair.decisions import CAPPED, Candidate, Decisions
 from patchwright.repair.deviation import two_sided
 from patchwright.repair.diagnosing import diagnose
 from patchwright.repair.diagnosis import Defect, Diagnosis
+from patchwright.repair.mended import LEFT_OUT
 from patchwright.repair.result import Face, LedgerEntry, Point, Problem, Progress, Repaired, Rung, Seam, Verdict
 from patchwright.repair.weld import weld
 
@@ -36,7 +38,7 @@ LEFT = {"opening", "parametrisation", "component", "thin", "unit", "far-field", 
 class _Outcome:
     """The assembly after keeping, sewing, healing and capping, with the words for the ledger.
 
-    `caps` are the parts that close openings, `around` the faces along each.
+    `caps` are the parts that close openings, `around` the faces along each; `left` the openings decided to stay open.
     """
 
     assembly: Assembly
@@ -45,15 +47,23 @@ class _Outcome:
     healed: Healed | None = None
     caps: tuple[int, ...] = ()
     around: tuple[tuple[int, ...], ...] = ()
+    left: tuple[tuple[Candidate, str], ...] = ()
 
 
 def repair_cad(
-    model: Assembly, tolerance: Tolerance, *, openings: str, diagnosis: Diagnosis, progress: Progress
+    model: Assembly,
+    tolerance: Tolerance,
+    *,
+    openings: str,
+    diagnosis: Diagnosis,
+    decisions: Decisions | None = None,
+    progress: Progress,
 ) -> Repaired:
     """Keep the faces of a CAD model, sew them where only round-off separates them, and heal the seams that are open.
 
     What no rung closes is refused with its place; `scope="all"` resurfaces the whole tessellation on the true surfaces
-    instead, and the message says so. `openings="close"` closes planar openings by trimmed planes on their own edges.
+    instead, and the message says so. `openings="close"` closes planar openings by trimmed planes on their own edges,
+    but for those `decisions` keep open.
     """
     progress("sewing", 0.2)
     outcome = _sewn(model)
@@ -64,11 +74,12 @@ def repair_cad(
     after = diagnosis
     if outcome.sewn is not None or healed is not None:
         progress("checking the mended shell", 0.6)
-        after = diagnose(outcome.assembly, tolerance=tolerance)
+        domain = decisions.surroundings.domain if decisions is not None else None
+        after = diagnose(outcome.assembly, tolerance=tolerance, domain=domain)
     problems = tuple(_problem(d) for d in after.defects if d.severity == "error" and d.kind not in LEFT)
     if openings == "close" and not problems:
         progress("capping openings", 0.7)
-        outcome, problems = _capped(outcome)
+        outcome, problems = _capped(outcome, decisions)
     ledger = _ledger(model, outcome, diagnosis, after)
     body, deviation = _triangulated(outcome.assembly, tolerance), None
     if problems:
@@ -105,7 +116,9 @@ def repair_cad(
         (),
         outcome.assembly,
         grid=grid,
-        figures=_figures(outcome.assembly, seams, (grid is not None and len(grid.blocks)) or 0, after),
+        figures=_figures(
+            outcome.assembly, seams, (grid is not None and len(grid.blocks)) or 0, after, len(outcome.caps)
+        ),
     )
 
 
@@ -138,17 +151,23 @@ def _sewn(model: Assembly) -> _Outcome:
     )
 
 
-def _capped(outcome: _Outcome) -> tuple[_Outcome, tuple[Problem, ...]]:
-    """Every free loop closed by a plane, or the reasons why some cannot be."""
+def _capped(outcome: _Outcome, decisions: Decisions | None) -> tuple[_Outcome, tuple[Problem, ...]]:
+    """Every free loop closed by a plane but those decided upon, or the reasons why some cannot be."""
     model = outcome.assembly
     if model.topology is None:
         return outcome, ()
     flat, loops = SEAM_SHARE * model.diagonal, free_loops(model)
+    if decisions is not None:
+        names = model.names
+        asked = [Candidate(CAPPED, loop.points, tuple(names[face] for face in loop.faces)) for loop in loops]
+        against = decisions.against(asked)
+        outcome = replace(outcome, left=tuple((c, why) for c, why in zip(asked, against, strict=True) if why))
+        loops = tuple(loop for loop, why in zip(loops, against, strict=True) if not why)
     problems = []
     for loop in loops:
         if why := reason_against(loop, flat):
-            names = ", ".join(model.parts[face].name for face in loop.faces)
-            words = f"the opening along {names} cannot be capped: {why}; --scope all closes it on the tessellation"
+            along = ", ".join(model.parts[face].name for face in loop.faces)
+            words = f"the opening along {along} cannot be capped: {why}; --scope all closes it on the tessellation"
             problems.append(Problem("opening", _point(loop.centre), loop.diagonal, words))
     if problems or not loops:
         return outcome, tuple(problems)
@@ -217,13 +236,19 @@ def _ledger(model: Assembly, outcome: _Outcome, before: Diagnosis, after: Diagno
         part = outcome.assembly.parts[at]
         entries.append(
             LedgerEntry(
-                "opening capped by a plane",
+                CAPPED,
                 Rung.BRIDGE,
                 tuple(outcome.assembly.parts[face].name for face in around),
                 f"{part.name} is trimmed by the opening's own edges; the faces around it are identical",
                 area=float(part.triangulation.areas.sum()),
                 where=_point(part.triangulation.bounds.mean(axis=0)),
+                size=part.triangulation.diagonal,
             )
+        )
+    for candidate, why in outcome.left:
+        place = candidate.fingerprint
+        entries.append(
+            LedgerEntry(CAPPED + LEFT_OUT, Rung.KEEP, candidate.parts, why, where=place.where, size=place.size)
         )
     for defect in after.defects:
         if outcome.caps and defect.kind == "opening":
@@ -273,7 +298,7 @@ def _seams(assembly: Assembly, tolerance: Tolerance) -> tuple[Seam, ...]:
 
 
 def _figures(
-    assembly: Assembly, seams: tuple[Seam, ...], blocks: int, after: Diagnosis
+    assembly: Assembly, seams: tuple[Seam, ...], blocks: int, after: Diagnosis, caps: int
 ) -> dict[str, float | int | str | bool]:
     smooth = np.array([s.angle for s in seams if s.kind == "smooth"] or [0.0])
     free = _free_edges(assembly)
@@ -282,7 +307,7 @@ def _figures(
         "grid blocks": blocks,
         "closed": free == 0,
         "free edges": free,
-        "openings kept": 0 if free == 0 else len(after.of("opening")),
+        "openings kept": 0 if free == 0 else max(len(after.of("opening")) - caps, 0),
         "largest seam gap": max((s.gap for s in seams), default=0.0),
         "largest smooth seam angle": float(smooth.max()),
         "median smooth seam angle": float(np.median(smooth)),

@@ -11,7 +11,8 @@ from patchwright.models.arrays import Array
 from patchwright.repair.fingerprint import Fingerprint, fingerprint, matched
 from patchwright.repair.surroundings import Surroundings
 
-OPTIONAL = ("bridge", "close", "stray triangles", "opening capped by a plane")
+CAPPED = "opening capped by a plane"
+OPTIONAL = ("bridge", "close", "stray triangles", CAPPED)
 """kinds of change that can be rejected: nothing later stands on them, so what they would mend just stays as it is"""
 
 

@@ -60,9 +60,7 @@ def repair(
     say = progress or _silent
     task = _task(assembly, scope, openings, tolerance, domain, plan, diagnosis, say)
     if task.model.is_cad and scope == "least":
-        from patchwright.repair.cad_route import repair_cad
-
-        result = repair_cad(task.model, task.limits, openings=openings, diagnosis=task.diagnosis, progress=say)
+        result = _cad(task, openings, say)
         result = replace(result, ledger=(*task.entries, *result.ledger))
     else:
         from patchwright.repair.aside import with_aside
@@ -111,9 +109,7 @@ def plan_repair(
     size = task.decisions.diagonal
     reasons = task.around.reasons
     if task.model.is_cad and scope == "least":
-        from patchwright.repair.cad_route import repair_cad
-
-        made = repair_cad(task.model, task.limits, openings=openings, diagnosis=task.diagnosis, progress=say)
+        made = _cad(task, openings, say)
         return plan_of(task.model.source, (*task.entries, *made.ledger), size, made.problems, reasons)
     from patchwright.repair.mend import mend
     from patchwright.repair.mesh_route import mending_ledger, problems_of
@@ -205,6 +201,19 @@ def _body(model: Assembly, around: Surroundings, limits: Tolerance) -> tuple[Ass
         start += count
         parts.append(replace(part, triangulation=replace(part.triangulation, vertices=points)))
     return replace(body, parts=tuple(parts)), (entry,)
+
+
+def _cad(task: _Task, openings: str, say: Progress) -> Repaired:
+    from patchwright.repair.cad_route import repair_cad
+
+    return repair_cad(
+        task.model,
+        task.limits,
+        openings=openings,
+        diagnosis=task.diagnosis,
+        decisions=task.decisions,
+        progress=say,
+    )
 
 
 def _against(plan: Plan, ledger: tuple[LedgerEntry, ...], diagonal: float) -> tuple[LedgerEntry, ...]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from patchwright.models.arrays import Array
+from patchwright.models.arrays import Array, IntArray
 from patchwright.models.tree import Tree
 from patchwright.models.triangulation import Triangulation
 from patchwright.repair.deviation import SAMPLES, Spread, sample_area, spread
@@ -70,7 +70,7 @@ def _areas(mesh: Triangulation) -> dict[str, float]:
     return {name: float(a) for name, a in zip(names, np.bincount(tags, mesh.areas, minlength=len(names)), strict=True)}
 
 
-def _tags(mesh: Triangulation) -> tuple[Array, tuple[str, ...]]:
+def _tags(mesh: Triangulation) -> tuple[IntArray, tuple[str, ...]]:
     if mesh.tags is None or not mesh.tag_names:
         return np.zeros(len(mesh), dtype=np.int64), ("",)
     # parts of one name are one region

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from oracles_shells import box, sphere, tube, without
 
-from patchwright.models import Triangulation
+from patchwright.models import Assembly, Cylinder, Triangulation
 from patchwright.models.errors import CorruptFile
-from patchwright.repair import Plan, plan_repair
+from patchwright.models.io import read, write
+from patchwright.repair import Plan, plan_repair, repair
 from patchwright.repair.ladder import _task
 from patchwright.repair.mend import mend
 from patchwright.repair.mesh_route import mending_ledger
@@ -108,6 +109,19 @@ def test_a_scrap_can_be_kept() -> None:
     assert (item.kind, item.optional) == ("stray triangles", True)
     assert len(replayed(model, plan).triangulation) == len(BALL)
     assert len(replayed(model, edited(plan, item.id)).triangulation) == len(BALL) + 2
+
+
+def test_one_of_two_caps_of_a_cad_model_can_be_rejected(tmp_path) -> None:
+    write(tmp_path / "pipe.step", Assembly.of(Cylinder((0, 0, 0), (0, 0, 1), 1.0, v=(0.0, 2.0))))
+    pipe = read(tmp_path / "pipe.step")
+    plan = plan_repair(pipe, openings="close")
+    assert [(item.rung, item.optional) for item in plan.items] == [("bridge", True)] * 2
+    top = max(plan.items, key=lambda i: i.where[2])
+    result = repair(pipe, openings="close", plan=edited(plan, top.id))
+    left = [e for e in result.ledger if e.what.endswith("left out")]
+    assert [(e.where[2], e.reason) for e in left] == [(pytest.approx(2.0), "the plan rejects it")]
+    assert result.figures["openings kept"] == 1
+    assert not any("not met" in e.what or "beside" in e.what for e in result.ledger)
 
 
 def test_what_later_steps_stand_on_cannot_be_rejected() -> None:
