@@ -173,7 +173,7 @@ def joined(arcs: list[Arc], scale: Array) -> list[Arc]:
     if not arcs:
         return []
     loops = [a for a in arcs if a.closed]
-    open_ = [a for a in arcs if not a.closed]
+    open_ = _without_specks([a for a in arcs if not a.closed], scale)
     if not open_:
         return loops
     points = np.array([a.jets[end, 0] / scale for a in open_ for end in (0, -1)])
@@ -206,6 +206,19 @@ def joined(arcs: list[Arc], scale: Array) -> list[Arc]:
             end = after
         out.append(_chained(chain, closed, float(scale[0])))
     return out
+
+
+def _without_specks(arcs: list[Arc], scale: Array) -> list[Arc]:
+    """The arcs but those that are too short to tell their ends apart and lie between the ends of others."""
+    from scipy.spatial import cKDTree
+
+    speck = np.array([a.ends[0] < 0 and a.ends[1] < 0 and a.lengths.sum() < SAME * scale[0] for a in arcs], dtype=bool)
+    if not speck.any() or speck.all():
+        return arcs
+    ends = np.array([a.jets[[0, -1], 0] / scale for a in arcs])
+    far, at = cKDTree(ends[~speck].reshape(-1, 7)).query(ends, p=np.inf)
+    spare = speck & (far <= SAME).all(axis=1) & (at[:, 0] != at[:, 1])
+    return [a for a, gone in zip(arcs, spare, strict=True) if not gone]
 
 
 def _chained(chain: list[Arc], closed: bool, size: float) -> Arc:
