@@ -37,8 +37,8 @@ class Limits:
     @classmethod
     def of(cls, diagonal: float) -> Limits:
         """The shares above of a diagonal."""
-        shares = (1.0, ON_SHARE, FIT_SHARE, REACH_SHARE, LOOSE_SHARE)
-        return cls(*(share * diagonal for share in shares), until=time.monotonic() + SECONDS)
+        on, fit, reach, loose = (share * diagonal for share in (ON_SHARE, FIT_SHARE, REACH_SHARE, LOOSE_SHARE))
+        return cls(diagonal, on, fit, reach, loose, time.monotonic() + SECONDS)
 
     @property
     def expired(self) -> bool:

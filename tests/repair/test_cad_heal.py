@@ -196,3 +196,35 @@ def test_patches_that_miss_each_other_meet_on_their_surfaces(tmp_path, gap, patc
         # the sphere is followed: nearer than the chord across the gap, whose height is width^2 / 8
         off = [np.abs(np.linalg.norm(points, axis=2) - 1.0).max() for points in (was, now)]
         assert off[1] <= off[0] + width**2 / 8.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("share", [1e-3, 1e-2])
+@pytest.mark.parametrize(
+    ("damage", "which"),
+    [
+        (lambda face, size, rng: shifted(face, size * unit(rng)), (17, 22, 80)),
+        (lambda face, size, rng: shifted(face, size * unit(rng)), (0, 30, 78)),
+        (lambda face, size, rng: turned(face, unit(rng), size / 30.0), (20, 24, 85)),
+        (lambda face, size, rng: pulled_back(face, size), (17, 50, 84)),
+    ],
+    ids=["shifted large", "shifted small", "turned", "pulled back"],
+)
+def test_a_real_part_with_three_damaged_faces_is_whole_again(data, tmp_path, damage, which, share):
+    whole = read(data("featuretype.step"))
+    rng, size = np.random.default_rng(sum(which)), share * whole.diagonal
+    shape = faces_of(read_shape(data("featuretype.step")))
+    faces = [damage(f, size, rng) if k in which else f for k, f in enumerate(shape)]
+    path = written(tmp_path / "damaged.step", faces, set(which))
+    before = read(path)
+    result, again = healed(path, tmp_path)
+    is_sound(again, tmp_path / "healed.step")
+    assert len(identical(result, before)) >= len(shape) - 3
+    assert sum(face.rung in (Rung.KEEP, Rung.WELD) for face in result.faces) >= 90
+    assert again.triangulation.volume == pytest.approx(whole.triangulation.volume, rel=1e-4)
+
+
+def unit(rng):
+    """A random direction."""
+    vector = rng.normal(size=3)
+    return vector / np.linalg.norm(vector)
