@@ -27,7 +27,8 @@ from patchwright.ssi.mesh_plane import intersect_mesh_plane
 from patchwright.ssi.mesh_surface_arcs import Arcs, joined, loose_ends, places
 from patchwright.ssi.plane_cubics import on_surface
 
-BUDGET = 4_000_000  # pairs of a box and a triangle judged; about a microsecond each
+BUDGET = 4_000_000  # pairs of a box and a triangle judged, one to three microseconds each
+BUDGET_EACH = 32  # and this many more for each triangle beside a piece
 SMALL = 1e-7  # of the size: boxes are not halved below
 REACH = 1e-9  # of the size: ends of arcs nearer than this are one
 MOST = 64  # unresolved boxes listed one by one
@@ -101,7 +102,7 @@ def _findings(mesh: Triangulation, pieces: BezierPieces, frame: Frame, tol: floa
     tol = max(tol, 8.0 * eps)
     rows, _ = kernel.meet(
         pieces.nets, _goes_on(pieces, eps), first, candidates.reshape(-1), _planes(corners), spread,
-        tol, eps, max(SMALL, 4.0 * tol), BUDGET,
+        tol, eps, max(SMALL, 4.0 * tol), BUDGET + BUDGET_EACH * len(pairs),
     )  # fmt: skip
     rows[:, 1] = used[rows[:, 1].astype(np.int64)] if len(rows) else 0
     return np.asarray(rows)
