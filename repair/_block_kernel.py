@@ -1,10 +1,10 @@
 """Kernels of `blocks`: traces through a quad mesh, and the place of every quad in its block.
 
-# mypy: disable-error-code="untyped-decorator"
-
 A half-edge is 4 q + k: side k of quad q, from its corner k to the next. `twin` holds the half-edge on the other side
 of the edge, -1 on a boundary.
 """
+
+# mypy: disable-error-code="untyped-decorator"
 
 from __future__ import annotations
 
