@@ -216,7 +216,7 @@ def _without_specks(arcs: list[Arc], scale: Array) -> list[Arc]:
     if not speck.any() or speck.all():
         return arcs
     ends = np.array([a.jets[[0, -1], 0] / scale for a in arcs])
-    far, at = cKDTree(ends[~speck].reshape(-1, 7)).query(ends, p=np.inf)
+    far, at = (np.asarray(found) for found in cKDTree(ends[~speck].reshape(-1, 7)).query(ends, p=np.inf))
     spare = speck & (far <= SAME).all(axis=1) & (at[:, 0] != at[:, 1])
     return [a for a, gone in zip(arcs, spare, strict=True) if not gone]
 
