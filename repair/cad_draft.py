@@ -61,11 +61,10 @@ class Change:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Draft:
-    """Parts with a topology that is being mended; `origin` is each part's input part, -1 for invented ones."""
+    """An assembly with a topology that is being mended; its parts stay in order."""
 
     assembly: Assembly
     topology: Topology
-    origin: tuple[int, ...]
 
     @property
     def parts(self) -> tuple[Part, ...]:

@@ -8,9 +8,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-import numpy as np
-
-from patchwright.models.arrays import IntArray
 from patchwright.models.assembly import Assembly
 from patchwright.models.cad.editing import compacted, welded
 from patchwright.models.cad.rebuild import rebuilt
@@ -29,17 +26,11 @@ FOLD = 179.0  # degrees between outward normals: two faces that lie on each othe
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Healed:
-    """The mended assembly, the input part of each part (-1: invented), and what was done.
-
-    `opened` counts the shared edges whose surfaces were apart; `free_before` and `free_after` the free edges.
-    """
+    """The mended assembly, what was done, and how many shared edges were taken apart because surfaces were apart."""
 
     assembly: Assembly
-    origin: IntArray
     changes: tuple[Change, ...]
     opened: int
-    free_before: int
-    free_after: int
 
 
 def heal(model: Assembly, diagonal: float) -> Healed | None:
@@ -52,10 +43,9 @@ def heal(model: Assembly, diagonal: float) -> Healed | None:
     if topology is None:
         return None
     limits = Limits.of(diagonal)
-    start = Draft(model, welded(topology, 2.0 * limits.on), tuple(range(len(model.parts))))
+    start = Draft(model, welded(topology, 2.0 * limits.on))
     draft, apart, widest = opened(start, limits)
-    before = _free(draft)
-    if not before:
+    if not (draft.topology.use_counts() == 1).any():
         return None
     tried = 0
     for crossing in (True, False):
@@ -65,8 +55,7 @@ def heal(model: Assembly, diagonal: float) -> Healed | None:
         tried = len(changes)
         made = _built(model, mended, limits, max(2.0 * limits.on, widest))
         if made is not None:
-            free = int((made.topology.use_counts() == 1).sum()) if made.topology else 0
-            return Healed(made, np.array(mended.origin), changes, apart, before, free)
+            return Healed(made, changes, apart)
     return None
 
 
@@ -87,10 +76,6 @@ def _climbed(draft: Draft, limits: Limits, crossing: bool) -> tuple[Draft, tuple
     return draft, changes
 
 
-def _free(draft: Draft) -> int:
-    return int((draft.topology.use_counts() == 1).sum())
-
-
 def _built(model: Assembly, draft: Draft, limits: Limits, widest: float) -> Assembly | None:
     """The draft as the kernel builds it, sewn where edges coincide but are not shared; None where it does not hold.
 
@@ -103,8 +88,7 @@ def _built(model: Assembly, draft: Draft, limits: Limits, widest: float) -> Asse
             if not sewn.dropped and sewn.surface_change.max(initial=0.0) <= 1e-12 * max(limits.diagonal, 1.0):
                 made = sewn.assembly
         sound = all(s.gap <= widest and s.angle < FOLD for s in measure_seams(made))
-        was = set(brep_status(model).invalid)
-        worse = [i for i in brep_status(made).invalid if i >= len(draft.origin) or draft.origin[i] not in was]
+        worse = set(brep_status(made).invalid) - set(brep_status(model).invalid)
     except EngineError:
         return None
     return made if sound and not worse else None
