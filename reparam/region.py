@@ -9,6 +9,7 @@ import numpy as np
 from patchwright.models.arrays import Array
 from patchwright.models.errors import ParameterError
 from patchwright.models.nurbs_surface import NurbsSurface
+from patchwright.reparam.defect import NO_LENGTH
 from patchwright.reparam.parameter_curves import ParameterCurve
 from patchwright.reparam.sides import ArcSide, straight
 
@@ -76,11 +77,16 @@ class Region:
 
     @classmethod
     def _of(cls, surface: NurbsSurface, curves: Curves, box: Array, *, whole: bool, name: str) -> Region:
-        inner = surface.grid(*np.linspace(box[:, 0], box[:, 1], 17).T).reshape(-1, 3)
-        size = float(np.linalg.norm(np.ptp(inner, axis=0)))
+        inner = surface.grid(*np.linspace(box[:, 0], box[:, 1], 17).T)
+        size = float(np.linalg.norm(np.ptp(inner.reshape(-1, 3), axis=0)))
         where = f"{name}: " if name else ""
         if not size > 0.0:
             raise ParameterError(f"{where}the surface is a single point: there is nothing to give parameters to")
+        for axis in (0, 1):
+            if float(np.linalg.norm(np.diff(inner, axis=axis), axis=2).sum(axis=axis).max()) <= NO_LENGTH * size:
+                raise ParameterError(
+                    f"{where}no extent along {'uv'[axis]}: this is a curve, not a surface"
+                )
         south, north, west, east = (ArcSide.of(surface, c, size) for c in curves)
         if (south.is_pole or north.is_pole) and (west.is_pole or east.is_pole):
             raise ParameterError(

@@ -24,6 +24,8 @@ from patchwright.reparam.parameter_curves import Chain, ParameterCurve
 ACCURACY = 1e-10  # of the length of a side
 PER_PIECE = 4  # entries of the table in a piece of the arc length's own
 FEWEST_PIECES = 512
+CROSSING_SAMPLES = 257
+BISECTIONS = 52
 MOST_CHORD_STEPS = 200
 RELAXED = 0.8  # of the power that would do for straight lines: bends answer more strongly
 
@@ -42,17 +44,24 @@ class CurveOnSurface:
 
     @property
     def breaks(self) -> Array:
-        """Those of the parameter curve, and where it crosses a knot line of the surface, nearly."""
-        own = self.pcurve.breaks
+        """Those of the parameter curve, and where it crosses a knot line of the surface."""
         lines = getattr(self.surface, "breaks", None)
-        if lines is None:
-            return own
-        ts = np.linspace(*self.domain, 257)
-        found = [own]
-        for axis, line in enumerate(lines):
-            at = np.searchsorted(line[1:-1], self.pcurve(ts)[:, axis])
-            found.append(0.5 * (ts[1:] + ts[:-1])[np.diff(at) != 0])
+        found = [self.pcurve.breaks]
+        for axis, line in enumerate(() if lines is None else lines):
+            found.append(self._crossings(axis, line[1:-1]))
         return np.unique(np.concatenate(found))
+
+    def _crossings(self, axis: int, line: Array) -> Array:
+        """Parameters where a coordinate of the curve passes one of the values (k,), by bisection."""
+        ts = np.linspace(*self.domain, CROSSING_SAMPLES)
+        above = self.pcurve(ts)[:, axis, None] >= line
+        k, which = np.nonzero(above[1:] != above[:-1])
+        low, high, rising = ts[k], ts[k + 1], above[k + 1, which]
+        for _ in range(BISECTIONS):
+            middle = 0.5 * (low + high)
+            beyond = (self.pcurve(middle)[:, axis] >= line[which]) == rising
+            low, high = np.where(beyond, low, middle), np.where(beyond, middle, high)
+        return np.asarray(high)
 
     @property
     def control_points(self) -> Array:
