@@ -84,9 +84,7 @@ class Region:
             raise ParameterError(f"{where}the surface is a single point: there is nothing to give parameters to")
         for axis in (0, 1):
             if float(np.linalg.norm(np.diff(inner, axis=axis), axis=2).sum(axis=axis).max()) <= NO_LENGTH * size:
-                raise ParameterError(
-                    f"{where}no extent along {'uv'[axis]}: this is a curve, not a surface"
-                )
+                raise ParameterError(f"{where}no extent along {'uv'[axis]}: this is a curve, not a surface")
         south, north, west, east = (ArcSide.of(surface, c, size) for c in curves)
         if (south.is_pole or north.is_pole) and (west.is_pole or east.is_pole):
             raise ParameterError(
