@@ -126,6 +126,9 @@ def repair(
     tolerance: Annotated[
         float | None, typer.Option(help="Fit tolerance in model units [1e-4 of the diagonal].")
     ] = None,
+    layout: Annotated[
+        Path | None, typer.Option("--layout", help="Patches laid out as in this file, such as an edited layout.json.")
+    ] = None,
     farfield: FarField = None,
     symmetry: Symmetry = None,
     fluid: Fluid = None,
@@ -157,6 +160,7 @@ def repair(
         output,
         scope=scope.value,
         openings=openings.value,
+        layout=str(layout) if layout else "auto",
         tolerance=tolerance,
         domain=_domain(farfield, symmetry, fluid),
         plan=plan,

@@ -38,6 +38,7 @@ def write_outputs(study: Study, names: tuple[str, ...], report: Report) -> tuple
     holds the results of two runs.
     """
     from patchwright.models.io import write
+    from patchwright.repair.layout_file import save_layout
 
     prepare_folder(study.folder)
     repaired = study.repaired
@@ -52,6 +53,8 @@ def write_outputs(study: Study, names: tuple[str, ...], report: Report) -> tuple
         if repaired.verdict is not Verdict.REFUSED:
             if suffix in (".xyz", ".p3d", ".x"):
                 thing = repaired.grid
+            elif suffix == ".json":
+                thing = repaired.network.layout if repaired.network is not None else None
             elif suffix in (".step", ".stp", ".igs", ".iges"):
                 thing = repaired.to_assembly() if repaired.faces else None
             else:
@@ -62,6 +65,8 @@ def write_outputs(study: Study, names: tuple[str, ...], report: Report) -> tuple
         if suffix in (".xyz", ".p3d", ".x"):
             # Plot3D holds no names; the report lists the faces in the order of the blocks
             write(path, replace(thing, names=()), iblank=True)
+        elif suffix == ".json":
+            save_layout(path, thing)
         else:
             write(path, thing)
         written.append(name)

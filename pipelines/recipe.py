@@ -65,6 +65,7 @@ def repair_recipe(
     *,
     scope: str = "least",
     openings: str = "keep",
+    layout: str = "auto",
     tolerance: float | None = None,
     domain: Domain | None = None,
     plan: Path | None = None,
@@ -73,7 +74,7 @@ def repair_recipe(
     """What `patchwright repair` does."""
     steps = (
         Step("diagnose", {}),
-        Step("repair", {"scope": scope, "openings": openings}),
+        Step("repair", {"scope": scope, "openings": openings, "layout": layout}),
         Step("write", {}),
         Step("pictures", {}),
         Step("report", {}),
@@ -91,7 +92,7 @@ def load_recipe(path: Path) -> Recipe:
     """
     import tomllib
 
-    from patchwright.pipelines.stages import STAGES
+    from patchwright.pipelines.stages import AUTO, STAGES
 
     try:
         table = tomllib.loads(path.read_text(encoding="utf-8"))
@@ -115,6 +116,8 @@ def load_recipe(path: Path) -> Recipe:
         if entry.get("name") not in STAGES:
             raise ParameterError(f"{path}: stage {i} is {entry.get('name')!r}; known are {', '.join(STAGES)}")
         STAGES[entry["name"]].settings(options)
+        if options.get("layout", AUTO) != AUTO:
+            options["layout"] = str(path.parent / str(options["layout"]))
         steps.append(Step(entry["name"], options))
     tolerance = table.get("tolerance")
     if tolerance is not None and not (isinstance(tolerance, int | float) and tolerance > 0):

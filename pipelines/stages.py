@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from patchwright.models.errors import ParameterError
 from patchwright.pipelines.progress import Report
 from patchwright.pipelines.study import Study
+
+if TYPE_CHECKING:
+    from patchwright.repair.quad_layout import QuadLayout
 
 Outcome = tuple[Study, dict[str, Any]]
 
@@ -51,6 +54,7 @@ def _repair(study: Study, options: dict[str, Any], report: Report) -> Outcome:
         study.assembly,
         scope=options["scope"],
         openings=options["openings"],
+        layout=_layout(options["layout"]),
         tolerance=study.tolerance,
         domain=study.domain,
         plan=study.plan,
@@ -60,6 +64,13 @@ def _repair(study: Study, options: dict[str, Any], report: Report) -> Outcome:
     notes = study.notes if study.plan is None else (*study.notes, against_plan(study.plan, repaired))
     figures = {"verdict": repaired.verdict.value, "faces": len(repaired.faces)}
     return replace(study, repaired=repaired, notes=notes), figures
+
+
+def _layout(wanted: str) -> QuadLayout | str:
+    """The layout of a file, or "auto"."""
+    from patchwright.repair.layout_file import load_layout
+
+    return wanted if wanted == AUTO else load_layout(wanted)
 
 
 def _write(study: Study, options: dict[str, Any], report: Report) -> Outcome:
@@ -83,13 +94,14 @@ def _report(study: Study, options: dict[str, Any], report: Report) -> Outcome:
     return replace(study, files=study.files + files), {"files": list(files)}
 
 
-GEOMETRY_FILES = ("repaired.step", "repaired.igs", "repaired.stl", "grid.xyz")
+AUTO = "auto"
+GEOMETRY_FILES = ("repaired.step", "repaired.igs", "repaired.stl", "grid.xyz", "layout.json")
 
 STAGES: dict[str, Stage] = {
     stage.name: stage
     for stage in (
         Stage("diagnose", _diagnose, {}),
-        Stage("repair", _repair, {"scope": "least", "openings": "keep"}),
+        Stage("repair", _repair, {"scope": "least", "openings": "keep", "layout": AUTO}),
         Stage("write", _write, {"files": GEOMETRY_FILES}),
         Stage("pictures", _pictures, {}),
         Stage("report", _report, {}),

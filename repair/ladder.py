@@ -58,8 +58,14 @@ def repair(
     ParameterError : an option without meaning, an empty assembly, a domain that names what is not there.
     """
     say = progress or _silent
+    if isinstance(layout, str) and layout != "auto":
+        raise ParameterError(f'layout must be "auto", a QuadLayout or a list of patches, got {layout!r}')
     task = _task(assembly, scope, openings, tolerance, domain, plan, diagnosis, say)
     if task.model.is_cad and scope == "least":
+        if not isinstance(layout, str):
+            raise ParameterError(
+                "a layout is for patches that replace a surface: CAD faces are kept unless scope is all"
+            )
         result = _cad(task, openings, say)
         result = replace(result, ledger=(*task.entries, *result.ledger))
     else:

@@ -121,3 +121,12 @@ def test_a_given_layout_is_used():
     radius = float(np.linalg.norm(clean.vertices, axis=1).max())
     repaired = repair(clean, layout=sphere_layout(2, radius))
     assert len(repaired.faces) == 24
+
+
+def test_the_layout_written_gives_the_same_patches_again(study):
+    from patchwright.repair.layout_file import load_layout
+
+    layout = load_layout(study.folder / "layout.json")
+    again = repair(read(study.source), layout=layout)
+    assert again.network is not None
+    np.testing.assert_allclose(again.network.points(4), study.repaired.network.points(4), rtol=0, atol=1e-9)
