@@ -63,10 +63,13 @@ def intersect_mesh_surface(mesh: Triangulation, surface: Surface, tolerance: flo
     pieces = BezierPieces.of(nurbs, frame)
     rows = _findings(mesh, pieces, frame, tolerance / frame.size)
     reach = max(REACH * frame.size, 10.0 * tolerance)
-    arcs = Arcs.of(rows, mesh, surface, pieces)
+    arcs, stray = _within(Arcs.of(rows, mesh, surface, pieces), mesh, reach)
     chains, points = joined(arcs, reach)
     curves = on_surface(surface, chains, tolerance)
     unresolved = _unresolved(rows, mesh, surface, pieces, curves)
+    unresolved += [
+        Unresolved(((float(t), float(t + 1)), (0.0, 0.0)), surface.domain, "an arc leaves its triangle") for t in stray
+    ]
     unresolved += [
         Unresolved(((float(t), float(t + 1)), (0.0, 0.0)), box, "a curve ends inside both")
         for t, box in loose_ends(arcs, chains, mesh, surface)
@@ -127,6 +130,14 @@ def _planes(corners: Array) -> Array:
     normals = np.concatenate([normal[:, None], inward], axis=1)
     through = np.concatenate([corners[:, :1], corners], axis=1)
     return np.concatenate([normals, -np.einsum("mki,mki->mk", normals, through)[..., None]], axis=2)
+
+
+def _within(arcs: Arcs, mesh: Triangulation, reach: float) -> tuple[Arcs, list[int]]:
+    """The arcs that end in their triangles, and the triangles of others."""
+    corners = np.repeat(mesh.corners[arcs.triangle], 2, axis=0)
+    good = (_from_triangles(arcs.ends.reshape(-1, 3), corners) <= reach).reshape(-1, 2).all(axis=1)
+    kept = Arcs(arcs.triangle[good], arcs.normal[good], arcs.ends[good], arcs.uv[good], arcs.side[good])
+    return kept, arcs.triangle[~good].tolist()
 
 
 def _unresolved(
