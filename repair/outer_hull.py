@@ -276,8 +276,8 @@ def _dropped(
     middle = corners[index].mean(axis=1)
     weight = np.maximum(lost, np.finfo(float).tiny)
     area = np.bincount(piece, lost)
-    where = np.stack([np.bincount(piece, weight * middle[:, k]) for k in range(3)], axis=1)
-    where /= np.bincount(piece, weight)[:, None]
+    moment = np.stack([np.bincount(piece, weight * middle[:, k]) for k in range(3)], axis=1)
+    where = moment / np.bincount(piece, weight)[:, None]
     # the triangle that lost most of itself tells which body the piece is of and where it lies
     order = np.lexsort((-lost / np.maximum(areas[index], np.finfo(float).tiny), piece))
     deep = order[np.searchsorted(piece[order], np.arange(len(area)))]
