@@ -203,7 +203,7 @@ def _surfaces(charts: Sequence[Chart], directions: Sequence[Direction], known: N
         knots.append(through.knots)
         for k, border in enumerate(chart.borders):
             if border.side.is_pole:
-                _row(nets[i], k)[:] = nets[i][-(k == 1), -(k == 3)]  # one point, without the spline's round-off
+                _row(nets[i], k)[:] = nets[i][-(k == 3), -(k == 1)]  # one point, without the spline's round-off
     for pair in known.shared:
         row = _row(nets[pair.leader], pair.first)
         _row(nets[pair.follower], pair.second)[:] = row[::-1] if pair.against else row
