@@ -97,7 +97,11 @@ def foot(G: Array, sign: float, t: float, eps: float, line: Array, b: Array) -> 
 def side_root(
     G: Array, E: Array, sign: float, ta: float, tb: float, ea: float, eb: float, eps: float, line: Array, b: Array
 ) -> float:  # fmt: skip
-    """Where E changes sign along the arc G = 0 between ta and tb."""
+    """Where E changes sign along the arc G = 0 between ta and tb; an end where it is zero is the place."""
+    if ea == 0.0:
+        return ta
+    if eb == 0.0:
+        return tb
     low = ta
     high = tb
     f = ea

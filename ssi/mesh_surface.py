@@ -2,7 +2,8 @@
 
 Method. The surface falls into Bezier pieces; they are halved until every pair of a box and a triangle is excluded or
 explained (`_triangle_box_kernel`): so existence and completeness come from bounds, not from samples. Arcs are joined
-end to end (`mesh_surface_arcs`) and become cubics in the planes of the triangles (`plane_cubics`). A plane is a mesh of
+end to end (`mesh_surface_arcs`) and become cubics in the planes of the triangles (`plane_cubics`), which are measured
+against their triangles and the surface: one that is off either leaves the answer incomplete. A plane is a mesh of
 two triangles and goes to the exact predicates (`mesh_plane`).
 
 Limits. Where the surface coincides with a triangle or touches it along a curve, and where it holds an edge of the mesh
@@ -26,6 +27,7 @@ from patchwright.ssi.intersection import Box, Contact, Intersection, Intersectio
 from patchwright.ssi.mesh_plane import intersect_mesh_plane
 from patchwright.ssi.mesh_surface_arcs import Arcs, joined, loose_ends, places
 from patchwright.ssi.plane_cubics import on_surface
+from patchwright.ssi.triangle_planes import from_triangles, planes
 
 BUDGET = 4_000_000  # pairs of a box and a triangle judged, one to three microseconds each
 BUDGET_EACH = 32  # and this many more for each triangle beside a piece
@@ -63,13 +65,11 @@ def intersect_mesh_surface(mesh: Triangulation, surface: Surface, tolerance: flo
     pieces = BezierPieces.of(nurbs, frame)
     rows = _findings(mesh, pieces, frame, tolerance / frame.size)
     reach = max(REACH * frame.size, 10.0 * tolerance)
-    arcs, stray = _within(Arcs.of(rows, mesh, surface, pieces), mesh, reach)
+    arcs = Arcs.of(rows, mesh, surface, pieces)
     chains, points = joined(arcs, reach)
-    curves = on_surface(surface, chains, tolerance)
+    curves = on_surface(mesh, surface, chains, tolerance)
     unresolved = _unresolved(rows, mesh, surface, pieces, curves)
-    unresolved += [
-        Unresolved(((float(t), float(t + 1)), (0.0, 0.0)), surface.domain, "an arc leaves its triangle") for t in stray
-    ]
+    unresolved += [_astray(mesh, surface, c) for c in curves if not c.residual <= reach]
     unresolved += [
         Unresolved(((float(t), float(t + 1)), (0.0, 0.0)), box, "a curve ends inside both")
         for t, box in loose_ends(arcs, chains, mesh, surface)
@@ -104,7 +104,7 @@ def _findings(mesh: Triangulation, pieces: BezierPieces, frame: Frame, tol: floa
     eps = 4.0 * np.finfo(np.float64).eps * (1.0 + float(np.abs(spread).max(initial=0.0)))
     tol = max(tol, 8.0 * eps)
     rows, _ = kernel.meet(
-        pieces.nets, _goes_on(pieces, eps), first, candidates.reshape(-1), _planes(corners), spread,
+        pieces.nets, _goes_on(pieces, eps), first, candidates.reshape(-1), planes(corners), spread,
         tol, eps, max(SMALL, 4.0 * tol), BUDGET + BUDGET_EACH * len(pairs),
     )  # fmt: skip
     rows[:, 1] = used[rows[:, 1].astype(np.int64)] if len(rows) else 0
@@ -118,26 +118,6 @@ def _goes_on(pieces: BezierPieces, eps: float) -> BoolArray:
     out[-1, :, 0] = np.abs(net[-1, :, -1] - net[0, :, 0]).max() <= 16.0 * eps
     out[:, -1, 1] = np.abs(net[:, -1, :, -1] - net[:, 0, :, 0]).max() <= 16.0 * eps
     return out.reshape(-1, 2)
-
-
-def _planes(corners: Array) -> Array:
-    """(m, 4, 4) normals and offsets of the triangles' planes and of those upright on their sides, positive inside."""
-    way = np.roll(corners, -1, axis=1) - corners
-    normal = np.cross(way[:, 0], way[:, 1])
-    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    inward = np.cross(normal[:, None], way)
-    inward /= np.linalg.norm(inward, axis=2, keepdims=True)
-    normals = np.concatenate([normal[:, None], inward], axis=1)
-    through = np.concatenate([corners[:, :1], corners], axis=1)
-    return np.concatenate([normals, -np.einsum("mki,mki->mk", normals, through)[..., None]], axis=2)
-
-
-def _within(arcs: Arcs, mesh: Triangulation, reach: float) -> tuple[Arcs, list[int]]:
-    """The arcs that end in their triangles, and the triangles of others."""
-    corners = np.repeat(mesh.corners[arcs.triangle], 2, axis=0)
-    good = (_from_triangles(arcs.ends.reshape(-1, 3), corners) <= reach).reshape(-1, 2).all(axis=1)
-    kept = Arcs(arcs.triangle[good], arcs.normal[good], arcs.ends[good], arcs.uv[good], arcs.side[good])
-    return kept, arcs.triangle[~good].tolist()
 
 
 def _unresolved(
@@ -159,6 +139,20 @@ def _unresolved(
             whole = ((0.0, float(len(mesh))), (0.0, 0.0))
             out.append(Unresolved(whole, surface.domain, f"{why}: and {len(some) - MOST} more boxes"))
     return out
+
+
+def _astray(mesh: Triangulation, surface: Surface, curve: IntersectionCurve) -> Unresolved:
+    """Where a curve runs on the surface that was measured to leave the surface or its triangles."""
+    box = surface.domain if curve.uv_b is None else _around(curve.uv_b.control_points, surface)
+    why = f"a curve was measured {curve.residual:.1e} off the mesh or the surface, more than the tolerance"
+    return Unresolved(((0.0, float(len(mesh))), (0.0, 0.0)), box, why)
+
+
+def _around(uv: Array, surface: Surface) -> Box:
+    """The least box of the domain around parameters (n, 2)."""
+    low, high = np.array(surface.domain).T
+    (u0, v0), (u1, v1) = np.clip([uv.min(axis=0), uv.max(axis=0)], low, high).tolist()
+    return (u0, u1), (v0, v1)
 
 
 def _beside(rows: Array, surface: Surface, pieces: BezierPieces, curves: list[IntersectionCurve]) -> BoolArray:
@@ -189,7 +183,7 @@ def _contacts(
 ) -> tuple[Contact, ...]:
     """Points of touch among triangles, parameters and points, each place once, without those on curves."""
     triangle, uv, points = near
-    gap = _from_triangles(points, mesh.corners[triangle])
+    gap = from_triangles(points, mesh.corners[triangle])
     off = gap <= 2.0 * tolerance
     for c in curves:
         off[off] = c.curve.closest(points[off]).distance > 10.0 * reach
@@ -201,14 +195,3 @@ def _contacts(
         i = some[np.argmin(gap[some])]
         out.append(Contact(points[i], None, (float(uv[i, 0]), float(uv[i, 1])), "touch", float(gap[i])))
     return tuple(out)
-
-
-def _from_triangles(points: Array, corners: Array) -> Array:
-    """(n,) distance of each point from its own triangle (n, 3, 3)."""
-    heights = np.einsum("mki,mi->mk", _planes(corners)[..., :3], points) + _planes(corners)[..., 3]
-    way = np.roll(corners, -1, axis=1) - corners
-    away = points[:, None] - corners
-    share = np.clip(np.einsum("mki,mki->mk", away, way) / np.einsum("mki,mki->mk", way, way), 0.0, 1.0)
-    sides = np.linalg.norm(away - share[..., None] * way, axis=2).min(axis=1, initial=np.inf)
-    inside = (heights[:, 1:] >= 0.0).all(axis=1)
-    return np.asarray(np.where(inside, np.abs(heights[:, 0]), sides))

@@ -15,8 +15,10 @@ import numpy as np
 from patchwright.models.arrays import Array, BoolArray, IntArray
 from patchwright.models.nurbs_curve import NurbsCurve
 from patchwright.models.surface import Surface
+from patchwright.models.triangulation import Triangulation
 from patchwright.ssi.intersection import CurveKind, IntersectionCurve
 from patchwright.ssi.mesh_surface_arcs import Chains
+from patchwright.ssi.triangle_planes import from_triangles
 
 STEPS = 30  # of Newton: twice what it takes from a chord error of 1e-2 at a crossing angle of 1e-3
 HALVINGS = 12  # of a piece of curve: each one makes a cubic's error 16 times smaller
@@ -24,6 +26,7 @@ JUMP = 1e-6  # of the parameters' range: farther apart than this, the parameters
 ROUND_OFF = 1e-14  # of the coordinates: no curve is asked to be nearer to the surface
 FLAT = 1e-6  # sine of the crossing angle below which a curve is one of touch
 INWARD = 1e-6  # of a piece: where the surface's normal is taken when there is none at its end
+ONE_SIDE = 1e-12  # of the parameters' range: derivatives are taken this far inside a piece, for kinks lie at its ends
 
 
 @dataclass(slots=True)
@@ -31,6 +34,7 @@ class _Pieces:
     """Pieces of curves, one per row, in order along each curve; every piece in the plane of one mesh triangle."""
 
     curve: IntArray
+    triangle: IntArray
     normal: Array
     start: Array
     end: Array
@@ -41,8 +45,14 @@ class _Pieces:
         return _Pieces(*(getattr(self, f.name)[index] for f in fields(self)))
 
 
-def on_surface(surface: Surface, chains: Chains, tolerance: float) -> tuple[IntersectionCurve, ...]:
-    """One curve per chain of arcs, within `tolerance` (a length) of the surface at nine places of every piece."""
+def on_surface(
+    mesh: Triangulation, surface: Surface, chains: Chains, tolerance: float
+) -> tuple[IntersectionCurve, ...]:
+    """One curve per chain of arcs, within `tolerance` (a length) of the surface at nine places of every piece.
+
+    The residual is measured, there and at the ends, on the surface and on the triangle of each piece: it is larger than
+    the tolerance where a piece cannot follow both.
+    """
     arcs = chains.arcs
     number = np.repeat(np.arange(len(chains.closed)), np.diff(chains.offsets))
     start, end = arcs.ends[:, 0].copy(), arcs.ends[:, 1].copy()
@@ -50,7 +60,7 @@ def on_surface(surface: Surface, chains: Chains, tolerance: float) -> tuple[Inte
     start[after] = end[after - 1]
     round_ = chains.closed
     start[chains.offsets[:-1][round_]] = end[chains.offsets[1:][round_] - 1]
-    pieces = _Pieces(number, arcs.normal, start, end, arcs.uv[:, 0].copy(), arcs.uv[:, 1].copy())
+    pieces = _Pieces(number, arcs.triangle, arcs.normal, start, end, arcs.uv[:, 0].copy(), arcs.uv[:, 1].copy())
     least = ROUND_OFF * float(np.abs(arcs.ends).max(initial=0.0))
     for _ in range(HALVINGS):
         # off the surface by d is off the curve by d / sin of the crossing angle
@@ -58,7 +68,7 @@ def on_surface(surface: Surface, chains: Chains, tolerance: float) -> tuple[Inte
         if not far.any():
             break
         pieces = _halved(surface, pieces, far)
-    residual = _residual(surface, pieces, 9)
+    residual = np.maximum(_residual(surface, pieces, 9), _off_triangles(mesh, surface, pieces, 9))
     curves = []
     borders = np.searchsorted(pieces.curve, np.arange(len(chains.closed) + 1))
     for i, (first, stop) in enumerate(pairwise(borders.tolist())):
@@ -98,10 +108,17 @@ def _newton(surface: Surface, uv: Array, about: Array, normal: Array) -> Array:
 def _sines(surface: Surface, pieces: _Pieces) -> Array:
     """(n,) the larger sine of the crossing angles at both ends."""
     both = [
-        np.linalg.norm(np.cross(pieces.normal, _normals(surface, uv, other)), axis=1)
+        np.linalg.norm(np.cross(pieces.normal, _normals(surface, _one_sided(surface, uv, other), other)), axis=1)
         for uv, other in ((pieces.uv_start, pieces.uv_end), (pieces.uv_end, pieces.uv_start))
     ]
     return np.asarray(np.maximum(*both))
+
+
+def _one_sided(surface: Surface, uv: Array, inner: Array) -> Array:
+    """(n, 2) parameters a little from `uv` towards `inner`: derivatives there are those on this side of a kink."""
+    low, high = np.array(surface.domain).T
+    least = ONE_SIDE * (high - low)
+    return np.asarray(uv + np.clip(inner - uv, -least, least))
 
 
 def _normals(surface: Surface, uv: Array, inner: Array) -> Array:
@@ -129,14 +146,15 @@ def _bezier(surface: Surface, pieces: _Pieces) -> tuple[Array, Array, Array]:
             (1, 1.0, pieces.uv_start, pieces.uv_end),
             (2, -1.0, pieces.uv_end, pieces.uv_start),
         ):
-            ahead = np.cross(pieces.normal, _normals(surface, uv, other))
+            at = _one_sided(surface, uv, other)
+            ahead = np.cross(pieces.normal, _normals(surface, at, other))
             size = np.linalg.norm(ahead, axis=1, keepdims=True)
             ahead = np.where(size > 0.0, ahead / np.where(size > 0.0, size, 1.0), way / length[:, None])
             ahead *= np.where(np.einsum("ij,ij->i", ahead, way) < 0.0, -1.0, 1.0)[:, None]
             reach = (sign * span / 3.0)[:, None]
             base = 0 if column == 1 else 3
             space[:, column] = space[:, base] + reach * ahead
-            su, sv = np.asarray(surface(uv[:, 0], uv[:, 1], (1, 0))), np.asarray(surface(uv[:, 0], uv[:, 1], (0, 1)))
+            su, sv = np.asarray(surface(at[:, 0], at[:, 1], (1, 0))), np.asarray(surface(at[:, 0], at[:, 1], (0, 1)))
             E, F, G = (np.einsum("ij,ij->i", x, y) for x, y in ((su, su), (su, sv), (sv, sv)))
             p, q = np.einsum("ij,ij->i", su, ahead), np.einsum("ij,ij->i", sv, ahead)
             det = E * G - F * F
@@ -167,6 +185,16 @@ def _residual(surface: Surface, pieces: _Pieces, samples: int) -> Array:
         uv = _at(plane, float(t))
         on = np.asarray(surface(*_inside(surface, uv)))
         worst = np.maximum(worst, np.linalg.norm(_at(space, float(t)) - on, axis=1))
+    return worst
+
+
+def _off_triangles(mesh: Triangulation, surface: Surface, pieces: _Pieces, samples: int) -> Array:
+    """(n,) largest distance of each cubic in space from its own triangle."""
+    space, _, _ = _bezier(surface, pieces)
+    corners = mesh.corners[pieces.triangle]
+    worst = np.zeros(len(space))
+    for t in np.linspace(0.0, 1.0, samples + 2):
+        worst = np.maximum(worst, from_triangles(_at(space, float(t)), corners))
     return worst
 
 

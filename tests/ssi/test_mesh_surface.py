@@ -1,13 +1,17 @@
 from __future__ import annotations
 
+from typing import Any
+
 import dirty_shapes as shapes
 import numpy as np
 import pytest
 import trimesh
 
-from patchwright.models import Cylinder, ParameterError, Plane, Sphere, Torus, Triangulation
+from patchwright.models import Cylinder, NurbsSurface, ParameterError, Plane, Sphere, Surface, Torus, Triangulation
+from patchwright.models.knots import greville, uniform_knots
 from patchwright.models.tree import Tree
 from patchwright.ssi.mesh_surface import intersect_mesh_surface
+from patchwright.ssi.mesh_surface_arcs import Arcs
 
 Z = (0.0, 0.0, 1.0)
 
@@ -203,3 +207,67 @@ def test_a_curve_along_a_seam_through_many_small_triangles() -> None:
     assert len(found.curves) == 2
     assert all(c.closed for c in found.curves)
     assert found.residual <= 1e-9
+
+
+def relief(p: int, knots: np.ndarray) -> NurbsSurface:
+    """A height field of degree p over a square of side 2, bumps of fixed height."""
+    x, y = np.meshgrid(2.0 * greville(p, knots) - 1.0, 2.0 * greville(p, knots) - 1.0, indexing="ij")
+    z = 0.3 * np.sin(5.0 * x + 1.0) * np.cos(4.0 * y)
+    return NurbsSurface((p, p), (knots, knots), np.stack([x, y, z], axis=-1))
+
+
+KINK = np.array([0, 0, 0, 0, 0.4, 0.4, 0.4, 1, 1, 1, 1], dtype=float)
+ON_BOTH: dict[str, Surface] = {
+    "bilinear facets": relief(1, uniform_knots(1, 6)),
+    "kinked": relief(3, KINK),
+    "smooth": relief(3, uniform_knots(3, 7)),
+    "closed": Torus((0.3, 0.1, 0.0), (0.2, 0.1, 1.0), 1.0, 0.3),
+}
+
+
+@pytest.mark.parametrize("surface", ON_BOTH.values(), ids=ON_BOTH.keys())
+def test_every_curve_lies_on_the_mesh_and_on_the_surface(surface: Surface) -> None:
+    """Between the places the fit was measured at, too: no farther from either than the residual says."""
+    ball = shapes.of(trimesh.creation.icosphere(3, radius=0.7))
+    found = intersect_mesh_surface(ball, surface)
+    assert found.complete
+    assert found.curves
+    tree = Tree.of(ball)
+    for curve in found.curves:
+        assert curve.residual <= 1e-10 * ball.diagonal
+        assert curve.uv_b is not None
+        t = np.linspace(*curve.curve.domain, 64 * len(curve.points))
+        points, (u, v) = curve.curve(t), curve.uv_b(t).T
+        allowed = 1.05 * curve.residual + 1e-15  # the largest of nine samples is nearly the largest of all
+        assert tree.closest(points).distance.max() <= allowed
+        assert np.linalg.norm(surface(u, v) - points, axis=1).max() <= allowed
+
+
+@pytest.mark.parametrize("slope", [0.25, 0.5, 0.75, 1.0])
+def test_a_side_in_line_with_the_end_of_an_arc(slope: float) -> None:
+    """A triangle within a tube meets it nowhere, though the line of one side, x = 0, ends at a border of a piece."""
+    corners = np.array([[0.0, 0.9], [-0.5, 0.7], [0.0, 0.5]])
+    inside = Triangulation(np.column_stack([corners, slope * corners[:, 1]]), np.array([[0, 1, 2]]))
+    found = intersect_mesh_surface(inside, Cylinder((0, 0, 0), Z, 1.0, (1.0, 0.0, 0.0), v=(-2.0, 2.0)))
+    assert found.complete
+    assert not found.curves
+    assert not found.points
+
+
+@pytest.mark.parametrize("distance", [1e-6, 1e-3])
+def test_a_curve_that_was_led_off_its_triangle_is_not_complete(
+    distance: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The end check does not trust what came before: arcs are spoilt, and the answer says so."""
+    honest = Arcs.of
+
+    def spoilt(*given: Any) -> Arcs:
+        arcs = honest(*given)
+        arcs.ends[:, :, 0] += distance
+        return arcs
+
+    monkeypatch.setattr(Arcs, "of", spoilt)
+    found = intersect_mesh_surface(shapes.of(trimesh.creation.icosphere(2)), Sphere((0.9, 0.2, 0.1), 0.8))
+    assert not found.complete
+    assert any("off the mesh or the surface" in u.reason for u in found.unresolved)
+    assert found.residual >= 0.1 * distance
