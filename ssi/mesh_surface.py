@@ -47,7 +47,8 @@ def intersect_mesh_surface(mesh: Triangulation, surface: Surface, tolerance: flo
     Parameters
     ----------
     tolerance : the curves are this near the surface, length; default 1e-10 of the smaller of the two sizes. A surface
-        that comes this near a triangle without crossing it touches it.
+        that comes this near a triangle without crossing it touches it. Arcs are joined across ten times that (1e-9 of
+        the size at least): residuals count it, and a larger one leaves the answer incomplete.
 
     Raises
     ------
@@ -144,7 +145,7 @@ def _unresolved(
 def _astray(mesh: Triangulation, surface: Surface, curve: IntersectionCurve) -> Unresolved:
     """Where a curve runs on the surface that was measured to leave the surface or its triangles."""
     box = surface.domain if curve.uv_b is None else _around(curve.uv_b.control_points, surface)
-    why = f"a curve was measured {curve.residual:.1e} off the mesh or the surface, more than the tolerance"
+    why = f"a curve was measured {curve.residual:.1e} off the mesh or the surface: do not trust it"
     return Unresolved(((0.0, float(len(mesh))), (0.0, 0.0)), box, why)
 
 
