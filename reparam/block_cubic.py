@@ -48,11 +48,11 @@ class BlockCubic:
             out.append(net if not out else net[1:])
         return np.concatenate(out)
 
-    def __call__(self, values: Array, at: Array) -> Array:
-        """(j, ...) the spline through values (k, ...) at parameters (j,)."""
+    def __call__(self, values: Array, at: Array, nu: int = 0) -> Array:
+        """(j, ...) the spline through values (k, ...) at parameters (j,), or its derivative nu."""
         from scipy.interpolate import BSpline
 
-        return np.asarray(BSpline(self.knots, self.controls(values), 3)(at))
+        return np.asarray(BSpline(self.knots, self.controls(values), 3)(at, nu))
 
 
 def surface_through(along: tuple[BlockCubic, BlockCubic], points: Array) -> NurbsSurface:

@@ -22,8 +22,10 @@ from patchwright.models.nurbs_curve import NurbsCurve
 from patchwright.reparam.block_cubic import FEWEST, BlockCubic
 
 SAMPLES = 257  # of the density, in a block
-SMOOTHED = 5  # samples whose largest density counts: where it changes fast the larger one
-FLOOR = 0.05  # of its mean: the least density
+STRIDE = 4  # samples in a step of the differences: shorter steps would measure round-off
+FLOOR = 0.2  # of its mean: the least density
+NOISE = 1e-8  # of the extent: fourth differences well below are the curve's tables', and the density stays even
+SHARES = 8192  # sites are multiples of its inverse, so that round-off does not move them
 MOST = 400  # points of a block
 PER_SPAN = 10  # samples of the deviation
 
@@ -114,16 +116,18 @@ def curve_deviation(cubic: BlockCubic, values: Array, along: Along) -> float:
 def _density(along: Along) -> Array:
     """(SAMPLES,) |x''''|^(1/4) over the share, from fourth differences, with a floor."""
     points = along(np.linspace(0.0, 1.0, SAMPLES))
-    fourth = np.linalg.norm(np.diff(points, 4, axis=0), axis=1) ** 0.25
-    fourth = np.pad(fourth, 2 + SMOOTHED // 2, mode="edge")
-    wide = np.lib.stride_tricks.sliding_window_view(fourth, SMOOTHED).max(axis=1)
-    mean = float(wide.mean())
-    return np.asarray(np.maximum(wide, FLOOR * mean) if mean > 0.0 else np.ones(SAMPLES))
+    inner = SAMPLES - 4 * STRIDE
+    differences = np.zeros((inner, points.shape[1]))
+    for k, weight in enumerate((1.0, -4.0, 6.0, -4.0, 1.0)):
+        differences += weight * points[k * STRIDE : k * STRIDE + inner]
+    fourth = np.pad(np.linalg.norm(differences, axis=1), 2 * STRIDE, mode="edge")
+    extent = float(np.linalg.norm(np.ptp(points, axis=0)))
+    least = np.hypot((FLOOR * (fourth**0.25).mean()) ** 4, NOISE * extent)
+    return np.asarray(np.hypot(fourth, least) ** 0.25 if least > 0.0 else np.ones(SAMPLES))
 
 
 def _spread(density: Array, count: int) -> Array:
-    """(count,) shares between which the integral of the density is the same."""
+    """(count,) shares, fewer where they fall together, between which the integral of the density is the same."""
     integral = np.concatenate(([0.0], np.cumsum(0.5 * (density[1:] + density[:-1]))))
     x = np.interp(np.linspace(0.0, integral[-1], count), integral, np.linspace(0.0, 1.0, len(density)))
-    x[0], x[-1] = 0.0, 1.0
-    return np.asarray(x)
+    return np.unique(np.round(x * SHARES) / SHARES)

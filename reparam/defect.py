@@ -26,9 +26,14 @@ def parametrisation_defect(surface: Surface, box: npt.ArrayLike | None = None) -
 
     0 is a chord-length parametrisation; lines of zero length (poles) are left out.
     """
-    low, high = np.asarray(surface.domain if box is None else box, dtype=np.float64).T
+    return unevenness(surface(*steps(surface.domain if box is None else box)))
+
+
+def steps(box: npt.ArrayLike) -> tuple[Array, Array]:
+    """u (34, 1) and v (1, 34) of 33 equal steps over ((u0, u1), (v0, v1))."""
+    low, high = np.asarray(box, dtype=np.float64).T
     u, v = np.linspace(low, high, STEPS + 1).T
-    return unevenness(surface(u[:, None], v[None]))
+    return u[:, None], v[None]
 
 
 def unevenness(points: Array) -> float:

@@ -1,8 +1,8 @@
 """Sites of one direction: halved where interpolation along it strays, taken out where it can do without.
 
 Interpolation on a tensor grid errs by what each direction errs alone, nearly. So each is judged by itself, on lines
-across the whole region: by how far it leaves the surface along its normal, and by how far it slips along the surface,
-which is what would spoil the parametrisation.
+across the whole region: by how far it leaves the surface along its normal, by how far it slips along the surface,
+which is what would spoil the parametrisation, and on the sides by how far it leaves the side.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ PER_SPAN = 4  # samples
 LINES = 3 * STEPS // 2  # across
 MOST_SITES = 240
 ROUNDS = 12
+TIES = 6  # digits: needs that agree in them are equal, whatever their round-off
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -78,7 +79,7 @@ def thinned(sites: Array, breaks: Array, uses: Sequence[Use], tolerance: float) 
     need = np.maximum(error[:-1], error[1:])
     keep = np.ones(len(sites), dtype=bool)
     fixed = np.isin(sites, breaks)
-    for k in (np.argsort(need) + 1).tolist():
+    for k in (np.argsort(np.round(need, TIES), kind="stable") + 1).tolist():
         if fixed[k]:
             continue
         keep[k] = False
@@ -87,6 +88,26 @@ def thinned(sites: Array, breaks: Array, uses: Sequence[Use], tolerance: float) 
         if not enough or any(_errors(left, one, tolerance, keep).max() > 1.0 for one in lines):
             keep[k] = True
     return sites[keep]
+
+
+def errors_at(use: Use, sites: Array, breaks: Array, at: Array, across: Array) -> Array:
+    """(k,) how far interpolation along the direction strays at single places, in the region's own sense.
+
+    Along the normal inside, off the side on a side; `at` (k,) and `across` (k,) are parameters, sites and breaks too.
+    """
+    cubic, k = BlockCubic(sites, breaks), np.arange(len(at))
+
+    def on_lines(x: Array) -> Array:
+        return use.chart.points(x, across) if use.axis == 0 else use.chart.points(across, x).swapaxes(0, 1)
+
+    values = on_lines(sites)
+    off = (cubic(values, at) - on_lines(at))[k, k]
+    tangent = cubic(values, at, 1)[k, k]
+    unit = tangent / np.maximum(np.linalg.norm(tangent, axis=1, keepdims=True), np.finfo(float).tiny)
+    beside = np.linalg.norm(off - (off * unit).sum(axis=1, keepdims=True) * unit, axis=1)
+    normal = use.chart.normals(*((at, across) if use.axis == 0 else (across, at)))
+    height = np.abs((off * (normal if use.axis == 0 else normal.swapaxes(0, 1))[k, k]).sum(axis=1))
+    return np.where((across == 0.0) | (across == 1.0), beside, height)
 
 
 def _lines_of(use: Use, sites: Array) -> _Lines:
@@ -105,7 +126,12 @@ def _lines_of(use: Use, sites: Array) -> _Lines:
 
 def _errors(cubic: BlockCubic, lines: _Lines, tolerance: float, keep: Array | None = None) -> Array:
     """(k,) the error at every sample, in parts of what is allowed."""
-    off = cubic(lines.values if keep is None else lines.values[keep], lines.at) - lines.exact
+    values = lines.values if keep is None else lines.values[keep]
+    off = cubic(values, lines.at) - lines.exact
     height = (off * lines.normal).sum(axis=2)
     slip = np.linalg.norm(off - height[..., None] * lines.normal, axis=2)
-    return np.asarray(np.maximum(np.abs(height) / tolerance, slip / lines.slack).max(axis=1))
+    error = np.maximum(np.abs(height) / tolerance, slip / lines.slack).max(axis=1)
+    tangent = cubic(values[:, [0, -1]], lines.at, 1)
+    unit = tangent / np.maximum(np.linalg.norm(tangent, axis=2, keepdims=True), np.finfo(float).tiny)
+    beside = off[:, [0, -1]] - (off[:, [0, -1]] * unit).sum(axis=2, keepdims=True) * unit
+    return np.asarray(np.maximum(error, np.linalg.norm(beside, axis=2).max(axis=1) / tolerance))

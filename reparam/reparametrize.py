@@ -27,16 +27,16 @@ from patchwright.reparam.defect import parametrisation_defect
 from patchwright.reparam.direction import Direction
 from patchwright.reparam.neighbours import AXES, Neighbourhood, neighbourhood, shared_within
 from patchwright.reparam.reconciliation import reconciled
-from patchwright.reparam.refinement import MOST_SITES, Use, refined, thinned
+from patchwright.reparam.refinement import MOST_SITES, Use, errors_at, refined, thinned
 from patchwright.reparam.region import Region
 from patchwright.reparam.verification import Deviation, deviation
 
 GOOD = 0.01  # defect of a surface that is left as it is
-PER_DIRECTION = 0.4  # of the tolerance, for the interpolation along one direction
-MARGIN = 0.95  # of the tolerance: what is measured at samples must be below
+PER_DIRECTION = 0.5  # of the tolerance, for the interpolation along one direction
 FIT_SAMPLES = 5  # per cell and direction while knots are put in
 VERIFY_SAMPLES = 20  # for the deviation that is reported
-ROUNDS = 25
+ROUNDS = 8  # of putting in, for either sampling
+PLACES = 64  # looked at in a round and surface, the worst
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,7 +48,7 @@ class Reparametrized:
     deviation: float
     """Largest distance of closest points between both, from either and along the sides, at 20 x 20 samples a cell."""
     defect_before: float
-    """max |chord share / step share - 1|, see `defect`; of a trimed face over the box of its sides."""
+    """max |chord share / step share - 1|, see `defect`; of a trimmed face over the box of its sides."""
     defect_after: float
     tolerance: float
     control_points_before: tuple[int, int]
@@ -123,15 +123,29 @@ def _together(regions: list[Region], tolerance: float) -> tuple[Reparametrized, 
     directions = [
         _sites(number, direction, charts, known, tolerance) for number, direction in enumerate(charts.directions)
     ]
-    for _ in range(ROUNDS):
-        surfaces = _surfaces(charts.charts, directions, known)
-        if not _insert_at_worst(charts, directions, known, surfaces, tolerance):
+    surfaces, measured = _fitted(charts, directions, known, tolerance)
+    return tuple(
+        _result(region, new, d, m, tolerance, notes)
+        for region, new, d, m, notes in zip(regions, surfaces, before, measured, charts.notes, strict=True)
+    )
+
+
+def _fitted(
+    charts: Charts, directions: list[Direction], known: Neighbourhood, tolerance: float
+) -> tuple[list[NurbsSurface], list[Deviation]]:
+    """The surfaces, with sites put in until they keep the tolerance, first at few samples, then at many."""
+    for per_span in (FIT_SAMPLES, VERIFY_SAMPLES):
+        for _ in range(ROUNDS):
+            surfaces = _surfaces(charts.charts, directions, known)
+            measured = [
+                deviation(chart, surface, _own_sites(directions, known, i), per_span)
+                for i, (chart, surface) in enumerate(zip(charts.charts, surfaces, strict=True))
+            ]
+            if not _insert(charts, directions, known, measured, tolerance):
+                break
+        if max(m.largest for m in measured) > tolerance:
             break
-    out = []
-    for i, (region, chart, new) in enumerate(zip(regions, charts.charts, surfaces, strict=True)):
-        measured = deviation(chart, new, _own_sites(directions, known, i), VERIFY_SAMPLES)
-        out.append(_result(region, new, before[i], measured, tolerance, charts.notes[i]))
-    return tuple(out)
+    return surfaces, measured
 
 
 def _kept(region: Region, defect: float, tolerance: float) -> Reparametrized:
@@ -215,32 +229,34 @@ def _row(net: Array, side: int) -> Array:
     return net[:, -(side % 2)] if side < 2 else net[-(side % 2)]
 
 
-def _insert_at_worst(
-    charts: Charts,
-    directions: list[Direction],
-    known: Neighbourhood,
-    surfaces: Sequence[NurbsSurface],
-    tolerance: float,
+def _insert(
+    charts: Charts, directions: list[Direction], known: Neighbourhood, measured: Sequence[Deviation], tolerance: float
 ) -> bool:
-    """Knot lines through the worst point of every surface that strays too far; False where none does."""
-    wanted: dict[int, list[float]] = {}
-    for i, (chart, surface) in enumerate(zip(charts.charts, surfaces, strict=True)):
-        sites = _own_sites(directions, known, i)
-        measured = deviation(chart, surface, sites, FIT_SAMPLES)
-        if measured.largest <= MARGIN * tolerance:
+    """Knot lines through the worst places of cells that stray too far; False where none does or no more may be put in.
+
+    Each runs across the direction whose interpolation strays more there; an interval between sites gets one at most.
+    """
+    wanted: dict[int, list[tuple[float, float]]] = {}
+    for i, (chart, found) in enumerate(zip(charts.charts, measured, strict=True)):
+        places = found.worst[found.worst[:, 2] > tolerance][:PLACES]
+        if not len(places):
             continue
+        errors = []
         for axis in (0, 1):
-            number = int(known.direction[i, axis])
-            x = measured.where[axis]
-            wanted.setdefault(number, []).append(1.0 - x if known.backwards[i, axis] else x)
+            own = _own_direction(directions, known, i, axis)
+            errors.append(errors_at(Use(chart, axis), own.sites, own.breaks, places[:, axis], places[:, 1 - axis]))
+        for (*at, distance), axis in zip(places.tolist(), np.argmax(errors, axis=0).tolist(), strict=True):
+            x = 1.0 - at[axis] if known.backwards[i, axis] else at[axis]
+            wanted.setdefault(int(known.direction[i, axis]), []).append((-distance, x))
     grown = False
-    for number, places in wanted.items():
-        grid_line = directions[number].sites
-        for x in places:
-            k = int(np.clip(np.searchsorted(grid_line, x) - 1, 0, len(grid_line) - 2))
-            a, b = grid_line[k], grid_line[k + 1]
-            if len(grid_line) < MOST_SITES:
-                grid_line = np.sort(np.append(grid_line, np.clip(x, 0.8 * a + 0.2 * b, 0.2 * a + 0.8 * b)))
-                grown = True
-        directions[number] = directions[number].with_sites(grid_line)
+    for number, ranked in wanted.items():
+        sites = directions[number].sites
+        x = np.array([place for _, place in sorted(ranked)])
+        interval = np.clip(np.searchsorted(sites, x) - 1, 0, len(sites) - 2)
+        _, first = np.unique(interval, return_index=True)
+        first = np.sort(first)[: max(MOST_SITES - len(sites), 0)]
+        a, b = sites[interval[first]], sites[interval[first] + 1]
+        new = np.clip(x[first], 0.8 * a + 0.2 * b, 0.2 * a + 0.8 * b)
+        directions[number] = directions[number].with_sites(np.sort(np.concatenate((sites, new))))
+        grown = grown or len(new) > 0
     return grown

@@ -28,6 +28,8 @@ class Deviation:
     largest: float
     where: tuple[float, float]
     least_sine: float
+    worst: Array
+    """(k, 3) s, t and distance of the worst sample of every cell, the worst cell first."""
 
 
 def deviation(chart: Chart, surface: NurbsSurface, sites: tuple[Array, Array], per_span: int) -> Deviation:
@@ -49,7 +51,19 @@ def deviation(chart: Chart, surface: NurbsSurface, sites: tuple[Array, Array], p
         curve = surface.boundary(name)
         found[index] = np.maximum(found[index], closest_on_curve(curve, border.points(x), start=x).distance)
     k = np.unravel_index(int(found.argmax()), found.shape)
-    return Deviation(float(found[k]), (float(s[k[0]]), float(t[k[1]])), _least_sine(chart, surface, s[1:-1], t[1:-1]))
+    worst = _worst_of_cells(at, found, per_span)
+    return Deviation(
+        float(found[k]), (float(s[k[0]]), float(t[k[1]])), _least_sine(chart, surface, s[1:-1], t[1:-1]), worst
+    )
+
+
+def _worst_of_cells(at: Array, found: Array, per_span: int) -> Array:
+    """(k, 3), the samples on the sides belonging to the cells beside them."""
+    m, n = ((size - 2) // per_span for size in found.shape)
+    i, j = (np.clip((np.arange(size) - 1) // per_span, 0, k - 1) for size, k in zip(found.shape, (m, n), strict=True))
+    order = np.argsort(-found, axis=None, kind="stable")
+    first = np.sort(np.unique((i[:, None] * n + j).ravel()[order], return_index=True)[1])
+    return np.concatenate((at, found[..., None]), axis=2).reshape(-1, 3)[order[first]]
 
 
 def _least_sine(chart: Chart, surface: NurbsSurface, s: Array, t: Array) -> float:

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
 from patchwright.models.arrays import Array
 from patchwright.models.assembly import Part
-from patchwright.models.surface import Surface
 from patchwright.repair.checks.examination import Examination, box_of
 from patchwright.repair.checks.registry import Finding, check
 from patchwright.repair.diagnosis import Defect, Severity
+from patchwright.reparam.defect import parametrisation_defect, steps
 
-STEPS = 33  # equal parameter steps per direction: knots alone see nothing in a single span
 UNEVEN = 1.0  # defect above which a face is mentioned: some step is twice as long as its share, or has no length
 POOR = 5.0  # defect above which a grid on the face's own parameters is of no use
 
@@ -30,7 +28,7 @@ def parametrisation(exam: Examination) -> Finding:
         if measure <= UNEVEN:
             continue
         severity: Severity = "warning" if measure > POOR else "info"
-        extent = box_of(part.triangulation.corners if len(part.triangulation) else part.surface(*_grid(box)))
+        extent = box_of(part.triangulation.corners if len(part.triangulation) else part.surface(*steps(box)))
         size = float(np.linalg.norm(extent[1] - extent[0]))
         name = part.name or f"face {i + 1}"
         message = (
@@ -38,35 +36,6 @@ def parametrisation(exam: Examination) -> Finding:
         )
         defects.append(Defect("parametrisation", severity, extent.mean(axis=0), size, (part.name,), 1, message, extent))
     return Finding(tuple(defects), {"largest_parametrisation_defect": worst})
-
-
-def parametrisation_defect(surface: Surface, box: npt.ArrayLike | None = None) -> float:
-    """max |chord share / step share − 1| over the rows and columns of a grid of equal parameter steps.
-
-    Parameters
-    ----------
-    box : ((u0, u1), (v0, v1)); default the surface's domain, which must then be finite
-
-    0 is a chord-length parametrisation; lines of zero length (poles) are left out.
-    """
-    u, v = _grid(np.asarray(surface.domain if box is None else box, dtype=np.float64))
-    points = surface(u, v)
-    return max(_unevenness(points), _unevenness(np.swapaxes(points, 0, 1)))
-
-
-def _grid(box: Array) -> tuple[Array, Array]:
-    u, v = (np.linspace(low, high, STEPS + 1) for low, high in box)
-    return u[:, None], v[None, :]
-
-
-def _unevenness(points: Array) -> float:
-    """Of the lines along the first axis of (n, k, 3)."""
-    chords = np.linalg.norm(np.diff(points, axis=0), axis=2)
-    total = chords.sum(axis=0)
-    lines = total > 1e-9 * max(float(total.max(initial=0.0)), np.finfo(float).tiny)
-    if not lines.any():
-        return 0.0
-    return float(np.abs(chords[:, lines] / total[lines] * len(chords) - 1.0).max())
 
 
 def _parameters(part: Part) -> Array | None:

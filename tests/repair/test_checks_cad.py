@@ -11,7 +11,7 @@ from patchwright.models.nurbs_curve import NurbsCurve
 from patchwright.models.topology import EdgeUse
 from patchwright.repair import diagnose
 from patchwright.repair.checks.cad_rims import free_edge_reach
-from patchwright.repair.checks.parametrisation import parametrisation_defect
+from patchwright.reparam import parametrisation_defect
 
 
 def quadratic(power: int) -> NurbsSurface:

@@ -21,8 +21,14 @@ SHAPES: dict[str, Callable[[], NurbsSurface]] = {
 }
 
 
-@pytest.mark.parametrize("name", SHAPES)
-@pytest.mark.parametrize("share", [1e-3, pytest.param(1e-4, marks=pytest.mark.slow), 1e-5])
+@pytest.mark.parametrize(
+    ("name", "share"),
+    [("crowded", 1e-3), ("wing", 1e-3), ("octant", 1e-3), ("octant", 1e-5)]
+    + [
+        pytest.param(name, share, marks=pytest.mark.slow)
+        for name, share in (("crowded", 1e-4), ("wing", 1e-4), ("octant", 1e-4), ("crowded", 1e-5), ("wing", 1e-5))
+    ],
+)
 def test_within_the_tolerance_at_even_speed_without_folds(name: str, share: float) -> None:
     old = SHAPES[name]()
     tolerance = share * size(old)
@@ -48,22 +54,23 @@ def test_fewer_points_for_a_wider_tolerance() -> None:
 
 def test_even_speed_whatever_map_it_was_run_through_by() -> None:
     # poor_parametrisation keeps the shape, so that both surfaces have the same chord-length lines
-    good, bad = reparametrize(octant(), 1e-6).surface, reparametrize(poor_parametrisation(octant(), 8.0), 1e-6).surface
+    good, bad = (reparametrize(s, 1e-5).surface for s in (octant(), poor_parametrisation(octant(), 8.0)))
     t = np.linspace(0.0, 1.0, 21)
     assert np.abs(good.grid(t, t) - bad.grid(t, t)).max() < 2e-4
 
 
-@pytest.mark.parametrize("scale", [1e-3, 1e3])
-def test_result_follows_scale_and_motion(scale: float) -> None:
-    old = crowded_bicubic()
+@pytest.mark.parametrize(("scale", "place"), [(1e-3, 1.0), (1e3, 100.0)])
+def test_result_follows_scale_and_motion(scale: float, place: float) -> None:
+    old, away = crowded_bicubic(), place * np.array([5.0, -3.0, 1.0])
     turn = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])
-    moved = NurbsSurface(old.degree, old.knots, scale * (old.control_points @ turn.T) + scale * np.array([5.0, -3, 1]))
+    moved = NurbsSurface(old.degree, old.knots, scale * (old.control_points @ turn.T + away))
     a, b = reparametrize(old, 1e-3), reparametrize(moved, 1e-3 * scale)
     t = np.linspace(0.0, 1.0, 15)
-    back = (b.surface.grid(t, t) / scale - np.array([5.0, -3, 1])) @ turn
-    # round-off may decide which of two knots can be spared: the same surface to well within the tolerance
-    assert np.abs(back - a.surface.grid(t, t)).max() < 1e-4
-    assert b.defect_after == pytest.approx(a.defect_after, abs=2e-3)
+    back = (b.surface.grid(t, t) / scale - away) @ turn
+    # the sites are the same ones; points 500 sizes away come with 1e-13 of round-off
+    assert b.control_points_after == a.control_points_after
+    assert np.abs(back - a.surface.grid(t, t)).max() < 1e-11
+    assert b.defect_after == pytest.approx(a.defect_after, abs=1e-9)
 
 
 def test_boundary_runs_at_the_speed_of_its_arc() -> None:
