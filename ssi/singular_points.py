@@ -161,18 +161,25 @@ def _pole(rows: Array, pieces: tuple[BezierPieces, BezierPieces]) -> tuple[bool,
 
 
 def grouped(points: Array, reach: float) -> list[IntArray]:
-    """Indices of points that hang together within a reach."""
+    """Indices of points that hang together within a reach; of points in one cell of an eighth of it one stands for all.
+
+    So crowds of points, as the boxes left over at an apex are, cost no more than places do.
+    """
     if not points.shape[0]:
         return []
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
     from scipy.spatial import cKDTree
 
-    pairs = cKDTree(points).query_pairs(reach, output_type="ndarray")
-    n = points.shape[0]
+    cell = np.floor((points - points.min(axis=0)) / (0.125 * reach))
+    _, lead, which = np.unique(cell, axis=0, return_index=True, return_inverse=True)
+    pairs = cKDTree(points[lead]).query_pairs(reach, output_type="ndarray")
+    n = lead.shape[0]
     graph = coo_matrix((np.ones(pairs.shape[0]), (pairs[:, 0], pairs[:, 1])), shape=(n, n))
     count, label = connected_components(graph, directed=False)
-    return [np.flatnonzero(label == k) for k in range(count)]
+    whole = label[which.reshape(-1)]
+    order = np.argsort(whole, kind="stable")
+    return sorted(np.split(order, np.searchsorted(whole[order], np.arange(1, count))), key=lambda group: int(group[0]))
 
 
 def ray_seeds(
