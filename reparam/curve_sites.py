@@ -1,9 +1,10 @@
 """Interpolation points of a curve from its arc length and curvature, as few as the tolerance allows.
 
 Hamann, Jean and Razdan (1999), section 2, choose them dense where the curvature varies. The error of a C2 cubic on
-steps h of the arc length is h^4 |x''''| / 384 at most, and x'''' is made of the curvature and its changes (Frenet:
-kappa^3, kappa kappa', kappa'', and the torsion). So the points here divide the integral of |x''''|^(1/4) evenly, and
-their number is the smallest that keeps the deviation within the tolerance.
+steps h of the arc length is h^4 |x''''| / 384 inside (up to 16 times that at its ends, which are not-a-knot), and
+x'''' is made of the curvature and its changes (Frenet: kappa^3, kappa kappa', kappa'', and the torsion). So the points
+here divide the integral of |x''''|^(1/4) evenly, and their number is the smallest that keeps the deviation within the
+tolerance.
 """
 
 from __future__ import annotations
