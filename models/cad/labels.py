@@ -6,7 +6,7 @@ from typing import Any
 
 from patchwright.models.assembly import Assembly
 from patchwright.models.cad import kernel
-from patchwright.models.cad.names import bodies_of, children, face_index
+from patchwright.models.cad.names import bodies_of, children, face_index, unlocated
 from patchwright.models.cad.native import faces_of
 
 _LABEL = 8  # characters of an IGES label
@@ -16,9 +16,9 @@ def label_step(writer: Any, shape: Any, faces: list[Any], assembly: Assembly) ->
     """Names the faces after their parts, solids and shells after their bodies."""
     process = writer.WS().TransferWriter().FinderProcess()
     for face, part in zip(faces, assembly.parts, strict=True):
-        _name_step(kernel.STEPConstruct.FindEntity_s(process, face), part.name)
+        _name_step(_step_entity(process, face), part.name)
     for body, name in _named_bodies(shape, faces, assembly):
-        _name_step(kernel.STEPConstruct.FindEntity_s(process, body), name)
+        _name_step(_step_entity(process, body), name)
 
 
 def label_iges(writer: Any, shape: Any, faces: list[Any], assembly: Assembly) -> None:
@@ -57,6 +57,12 @@ def _named_bodies(shape: Any, faces: list[Any], assembly: Assembly) -> list[tupl
         if len(names) == 1 and (name := names.pop()):
             out.append((body, name))
     return out
+
+
+def _step_entity(process: Any, shape: Any) -> Any:
+    """The entity of a shape; the writer knows what an assembly places by its form without the place."""
+    found = kernel.STEPConstruct.FindEntity_s(process, shape)
+    return kernel.STEPConstruct.FindEntity_s(process, unlocated(shape)) if found is None else found
 
 
 def _name_step(item: Any, name: str) -> None:

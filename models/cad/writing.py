@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from io import BytesIO
 from pathlib import Path
@@ -14,7 +15,7 @@ from patchwright.models.cad.build import build_faces, natural_face
 from patchwright.models.cad.connectivity import components, is_closed
 from patchwright.models.cad.convert_surface import surface_to_kernel, v_scale_of
 from patchwright.models.cad.labels import label_iges, label_step
-from patchwright.models.cad.names import bodies_of
+from patchwright.models.cad.names import bodies_of, face_index
 from patchwright.models.cad.native import NativeFace, NativeShape, decode, decode_face, faces_of
 from patchwright.models.errors import EngineError
 
@@ -88,7 +89,7 @@ def shape_of(assembly: Assembly, deviation: Array, volumes: dict[int, float] | N
         chosen = [faces[p.native.index] for p in parts]
         if len({p.native.index for p in parts}) == len(faces):
             return shape, chosen
-        return _kept_bodies(assembly, list(range(len(parts)))), chosen
+        return compound(_kept_bodies(assembly, list(range(len(parts))))), chosen
     if assembly.topology is not None:
         surfaces = {i: _native_surface(p.native) for i, p in enumerate(parts) if isinstance(p.native, NativeFace)}
         faces = build_faces(assembly, deviation, surfaces)
@@ -103,8 +104,14 @@ def shape_of(assembly: Assembly, deviation: Array, volumes: dict[int, float] | N
         if i not in made and part.surface is not None:
             made[i] = natural_face(part.surface, *surface_to_kernel(part.surface))
     loose = [made[i] for i in range(len(parts)) if i not in set(kept)]
-    bodies = [_kept_bodies(assembly, kept)] if kept else []
-    return compound([*bodies, *loose]), [made[i] for i in range(len(parts))]
+    listed = [made[i] for i in range(len(parts))]
+    index = face_index(listed)
+    # one flat compound in the order of the parts: the writer forgets the names inside a compound within another
+    bodies = sorted(
+        [*_kept_bodies(assembly, kept), *loose],
+        key=lambda body: min(index.FindIndex(f) or math.inf for f in faces_of(body)),
+    )
+    return compound(bodies), listed
 
 
 def _native_surface(native: NativeFace) -> tuple[Any, float]:
@@ -113,7 +120,7 @@ def _native_surface(native: NativeFace) -> tuple[Any, float]:
     return surface, 1.0 / v_scale_of(surface)
 
 
-def _kept_bodies(assembly: Assembly, kept: list[int]) -> Any:
+def _kept_bodies(assembly: Assembly, kept: list[int]) -> list[Any]:
     """Native faces in their own solids and shells where those are whole, in shells of what is left otherwise."""
     builder = kernel.BRep_Builder()
     shapes: dict[str, NativeShape] = {}
@@ -143,7 +150,7 @@ def _kept_bodies(assembly: Assembly, kept: list[int]) -> Any:
         for i in range(1, wanted[key].Size() + 1):
             if not placed.Contains(wanted[key].FindKey(i)):
                 out.append(wanted[key].FindKey(i))
-    return compound(out)
+    return out
 
 
 def _body(faces: list[Any], closed: bool, volume: float | None) -> Any:

@@ -23,12 +23,12 @@ from patchwright.reparam import parametrisation_defect
 
 @pytest.fixture(scope="module")
 def model(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Two badly parametrized pieces that share a side, and a plane."""
+    """Two badly parametrized pieces that share a side, and a plane between them in the file."""
     path = tmp_path_factory.mktemp("reparam") / "model.step"
     left, right = crowded_bicubic().split("u", 0.4)
     nothing = Triangulation(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64))
     plane = Plane([0, 0, -1], [0, 0, 1], u=(0.0, 1.0), v=(0.0, 1.0))
-    parts = [Part(n, nothing, surface=s) for n, s in (("left", left), ("right", right), ("floor", plane))]
+    parts = [Part(n, nothing, surface=s) for n, s in (("left", left), ("floor", plane), ("right", right))]
     write(path, Assembly(tuple(parts), unit="mm"))
     return path
 
@@ -37,15 +37,18 @@ def test_all_faces(model: Path, tmp_path: Path) -> None:
     out = tmp_path / "new" / "out.step"
     run = run_reparam(model, out, tolerance=1e-3, names=(), terminal=Terminal(quiet=True))
     assert run.complete
-    assert [f.result is not None for f in run.faces] == [True, True, False]
-    assert run.faces[2].kept.startswith("good as it is")
+    assert [f.result is not None for f in run.faces] == [True, False, True]
+    assert run.faces[1].kept.startswith("good as it is")
     assert set(run.files) >= {"out.step", "out-report.json"}
     report = json.loads((tmp_path / "new" / "out-report.json").read_text())
     assert report == reparam_json(run)
     old, new = read(model).parts, read(out).parts
+    assert [p.name for p in new] == ["left", "floor", "right"]
     by_name = {p.name: p.surface for p in new}
-    assert sum(isinstance(p.surface, Plane) for p in new) == 1
-    for part, face in zip(old[:2], report["faces"], strict=False):
+    assert isinstance(by_name["floor"], Plane)
+    for part, face in zip(old, report["faces"], strict=True):
+        if part.name == "floor":
+            continue
         surface = by_name[part.name]
         assert isinstance(surface, NurbsSurface)
         assert isinstance(part.surface, NurbsSurface)
@@ -65,7 +68,7 @@ def test_all_faces(model: Path, tmp_path: Path) -> None:
 
 def test_named_face_only(model: Path, tmp_path: Path) -> None:
     run = run_reparam(model, tmp_path / "out.igs", tolerance=1e-3, names=["right"], terminal=Terminal(quiet=True))
-    assert [f.result is not None for f in run.faces] == [False, True, False]
+    assert [f.result is not None for f in run.faces] == [False, False, True]
     surfaces = [p.surface for p in read(tmp_path / "out.igs").parts]
     old = {p.name: p.surface for p in read(model).parts}["left"]
     assert isinstance(old, NurbsSurface)
