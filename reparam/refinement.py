@@ -107,7 +107,7 @@ def errors_at(use: Use, sites: Array, breaks: Array, at: Array, across: Array) -
     beside = np.linalg.norm(off - (off * unit).sum(axis=1, keepdims=True) * unit, axis=1)
     normal = use.chart.normals(*((at, across) if use.axis == 0 else (across, at)))
     height = np.abs((off * (normal if use.axis == 0 else normal.swapaxes(0, 1))[k, k]).sum(axis=1))
-    return np.where((across == 0.0) | (across == 1.0), beside, height)
+    return np.asarray(np.where((across == 0.0) | (across == 1.0), beside, height))
 
 
 def _lines_of(use: Use, sites: Array) -> _Lines:
