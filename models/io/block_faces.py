@@ -40,7 +40,8 @@ def block_faces(path: Path, block: Array, visible: BoolArray) -> list[tuple[str,
             # i × j = k, j × k = i, but the plane of axis j has i before k, against k × i = j
             inwards = (end == 0) != (axis == 1)
             faces.append((f"-{AXES[axis]}{label}", _cells(path, block, visible, plane.T if inwards else plane)))
-    points = block.reshape(-1, 3) - block.reshape(-1, 3).mean(axis=0)
+    unit = block.reshape(-1, 3) / max(float(np.abs(block).max()), np.finfo(np.float64).tiny)  # squares stay finite
+    points = unit - unit.mean(axis=0)
     a, b, c = np.moveaxis(points[np.concatenate([triangles for _, triangles in faces])], 1, 0)
     if np.einsum("ij,ij->", a, np.cross(b, c)) < 0.0:  # a left-handed block: inside out
         faces = [(label, np.ascontiguousarray(triangles[:, ::-1])) for label, triangles in faces]
