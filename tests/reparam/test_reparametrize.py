@@ -46,7 +46,7 @@ def test_within_the_tolerance_at_even_speed_without_folds(name: str, share: floa
 
 
 def test_fewer_points_for_a_wider_tolerance() -> None:
-    counts = [np.prod(reparametrize(octant(), tolerance).control_points_after) for tolerance in (1e-2, 1e-4, 1e-6)]
+    counts = [np.prod(reparametrize(octant(), tolerance).control_points_after) for tolerance in (1e-2, 1e-3, 1e-5)]
     assert counts[0] < counts[1] < counts[2]
     # cubic interpolation: a hundredth of the error for 100^(1/4) = 3.2 times the knots a direction
     assert counts[2] < 3.2**2 * 1.5 * counts[1]
@@ -74,7 +74,7 @@ def test_result_follows_scale_and_motion(scale: float, place: float) -> None:
 
 
 def test_boundary_runs_at_the_speed_of_its_arc() -> None:
-    made = reparametrize(octant(), 1e-6).surface
+    made = reparametrize(octant(), 1e-5).surface
     angle = np.arctan2(*made(np.linspace(0, 1, 34), 0.0)[:, [1, 0]].T)
     assert np.abs(angle - np.linspace(0, np.pi / 2, 34)).max() < 1e-5
 
