@@ -183,17 +183,17 @@ def try_place(m, g, v, x, y, z):
 
 
 @njit(cache=True, nogil=True, error_model="numpy", _nrt=False, no_cfunc_wrapper=True)
-def smooth_quads(m, g, quads, outward, offsets, around, near_offsets, near, low, high, goal, rounds):
+def smooth_quads(m, g, quads, outward, offsets, around, near_offsets, near, low, high, busy, goal, rounds):
     """Even out the quads; a vertex moves only when the worst quad round it is not spoilt.
 
     Round poor quads better places are searched for.
 
-    `low`, `high` (n,): the vertices before and after on the curve; `near`: edge neighbours.
+    `low`, `high` (n,): the vertices before and after on the curve; `near`: edge neighbours; `busy` (n,): those to move.
     """
     kind, X, vs, vt, H, N, vc = m.kind, m.X, m.vs, m.vt, m.H, m.N, m.vc
     for _ in range(rounds):
         for v in range(len(offsets) - 1):
-            if kind[v] == 2:
+            if kind[v] == 2 or not busy[v]:
                 continue
             old = worst_at(m, v, offsets, around, quads, outward)
             ox, oy, oz, os, ot, oh = X[v, 0], X[v, 1], X[v, 2], vs[v], vt[v], H[v]

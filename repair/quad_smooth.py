@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from patchwright.models.arrays import Array, IntArray
+from patchwright.models.arrays import Array, BoolArray, IntArray
 from patchwright.repair.pairing import QuadMesh
 
 ROUNDS = 4  # normals at the quads' centres are renewed between rounds
-EXTRA = 8  # further rounds while a quad is poorer than POOR
+EXTRA = 8  # further rounds, near quads poorer than POOR only
 POOR = 0.1
 PASSES = 6  # over all vertices in a round
 GOAL = 0.6  # scaled Jacobian that evening out may go down to
@@ -34,14 +34,25 @@ def smooth(quad_mesh: QuadMesh, *, rounds: int = ROUNDS) -> None:
     low, high = np.full(n, -1, dtype=np.int64), np.full(n, -1, dtype=np.int64)
     high[quad_mesh.sides[:, 0]] = quad_mesh.sides[:, 1]
     low[quad_mesh.sides[:, 1]] = quad_mesh.sides[:, 0]
+    busy = np.ones(n, dtype=bool)
     for turn in range(rounds + EXTRA if rounds else 0):
-        if turn >= rounds and scaled_jacobians(quad_mesh).min() > POOR:
-            break
+        if turn >= rounds:
+            poor = scaled_jacobians(quad_mesh) <= POOR
+            if not poor.any():
+                break
+            busy = _around(quads, _around(quads, poor, n)[quads].any(axis=1), n)
         update_outward(mesh, ground, quads, quad_mesh.region, quad_mesh.outward)
         kernel.smooth_quads(
-            mesh, ground, quads, quad_mesh.outward, offsets, around, near_offsets, near, low, high, GOAL, PASSES
+            mesh, ground, quads, quad_mesh.outward, offsets, around, near_offsets, near, low, high, busy, GOAL, PASSES
         )
     update_outward(mesh, ground, quads, quad_mesh.region, quad_mesh.outward)
+
+
+def _around(quads: IntArray, which: BoolArray, n: int) -> BoolArray:
+    """(n,) the vertices of some quads (m,)."""
+    out = np.zeros(n, dtype=bool)
+    out[quads[which]] = True
+    return out
 
 
 def update_outward(mesh: Any, ground: Any, quads: IntArray, region: IntArray, outward: Array) -> None:
