@@ -37,7 +37,7 @@ def smooth(quad_mesh: QuadMesh, *, rounds: int = ROUNDS) -> None:
     busy = np.ones(n, dtype=bool)
     for turn in range(rounds + EXTRA if rounds else 0):
         if turn >= rounds:
-            poor = scaled_jacobians(quad_mesh) <= POOR
+            poor = np.asarray(scaled_jacobians(quad_mesh) <= POOR)
             if not poor.any():
                 break
             busy = _around(quads, _around(quads, poor, n)[quads].any(axis=1), n)
