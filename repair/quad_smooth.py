@@ -37,10 +37,11 @@ def smooth(quad_mesh: QuadMesh, *, rounds: int = ROUNDS) -> None:
     busy = np.ones(n, dtype=bool)
     for turn in range(rounds + EXTRA if rounds else 0):
         if turn >= rounds:
-            poor = np.asarray(scaled_jacobians(quad_mesh) <= POOR)
+            poor: BoolArray = scaled_jacobians(quad_mesh) <= POOR
             if not poor.any():
                 break
-            busy = _around(quads, _around(quads, poor, n)[quads].any(axis=1), n)
+            beside: BoolArray = _around(quads, poor, n)[quads].any(axis=1)
+            busy = _around(quads, beside, n)
         update_outward(mesh, ground, quads, quad_mesh.region, quad_mesh.outward)
         kernel.smooth_quads(
             mesh, ground, quads, quad_mesh.outward, offsets, around, near_offsets, near, low, high, busy, GOAL, PASSES
