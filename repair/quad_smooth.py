@@ -40,7 +40,7 @@ def smooth(quad_mesh: QuadMesh, *, rounds: int = ROUNDS) -> None:
             poor: BoolArray = scaled_jacobians(quad_mesh) <= POOR
             if not poor.any():
                 break
-            beside: BoolArray = _around(quads, poor, n)[quads].any(axis=1)
+            beside = np.asarray(_around(quads, poor, n)[quads].any(axis=1))
             busy = _around(quads, beside, n)
         update_outward(mesh, ground, quads, quad_mesh.region, quad_mesh.outward)
         kernel.smooth_quads(
