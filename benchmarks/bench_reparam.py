@@ -8,12 +8,12 @@ are apart.
 
 from __future__ import annotations
 
+import sys
 import time
+from pathlib import Path
 
 import numpy as np
 
-from patchwright.models import NurbsSurface
-from patchwright.models.knots import bezier_knots
 from patchwright.reparam.placement import place
 from patchwright.reparam.placement_queue import place_by_queue
 from patchwright.reparam.region import Region
@@ -22,20 +22,11 @@ from patchwright.reparam.start_grid import start_grid
 SIZES = (10, 20, 40)
 
 
-def crowded() -> NurbsSurface:
-    """One bicubic span with badly placed control points."""
-    x, y = np.array([0.0, 0.05, 0.15, 1.0]), np.array([0.0, 0.7, 0.9, 1.0])
-    net = np.zeros((4, 4, 3))
-    net[..., 0], net[..., 1] = x[:, None], y[None]
-    net[1:3, 1:3, 2] = 0.4
-    net[1, 2, 0] += 0.3
-    net[2, 1, 1] -= 0.3
-    net[0, 1, 1] -= 0.4
-    return NurbsSurface((3, 3), (bezier_knots(3), bezier_knots(3)), net)
-
-
 def main() -> None:
-    surface = crowded()
+    sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
+    from reparam_shapes import crowded_bicubic
+
+    surface = crowded_bicubic()
     sides = Region.of_surface(surface).sides
     titles = ("grid", "queue s", "moves", "newton s", "steps", "ratio", "E queue", "E newton", "apart")
     print("".join(f"{title:>10}" for title in titles))

@@ -3,29 +3,17 @@
 from __future__ import annotations
 
 import json
-import os
 
 import numpy as np
 import pytest
+from command_line import command
 from oracles_shells import box, moved, sphere, without
 
 from patchwright.models import ParameterError, Triangulation
 from patchwright.models.errors import CorruptFile
 from patchwright.models.io import write
 from patchwright.pipelines.check import FailOn, checked_json, files_of, run_check
-from patchwright.pipelines.cli import main
 from patchwright.pipelines.summary import checked_lines
-
-
-def command(monkeypatch, capfd, *words) -> tuple[int, str, str]:
-    monkeypatch.setattr("sys.argv", ["patchwright", *map(str, words)])
-    stdout = os.dup(1)  # the command sends descriptor 1 to stderr for good
-    with pytest.raises(SystemExit) as leaving:
-        main()
-    os.dup2(stdout, 1)
-    os.close(stdout)
-    out, err = capfd.readouterr()
-    return int(leaving.value.code or 0), out, err
 
 
 def failing(path, fail_on: str = "warning", **options) -> list[str]:

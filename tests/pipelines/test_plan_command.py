@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import json
-import os
 
 import numpy as np
 import pytest
+from command_line import command
 from oracles_shells import sphere, without
 
 from patchwright.models import ParameterError
 from patchwright.models.errors import CorruptFile
 from patchwright.models.io import write
-from patchwright.pipelines.cli import main
 from patchwright.pipelines.planning import load_plan, run_plan
 from patchwright.pipelines.recipe import load_recipe, repair_recipe
 from patchwright.repair import Domain
@@ -24,17 +23,6 @@ BALL = sphere(32)
 def holed(tmp_path):
     write(tmp_path / "ball.stl", without(BALL, np.array([40, 400])))
     return tmp_path / "ball.stl"
-
-
-def command(monkeypatch, capfd, *words) -> tuple[int, str, str]:
-    monkeypatch.setattr("sys.argv", ["patchwright", *map(str, words)])
-    stdout = os.dup(1)  # the command sends descriptor 1 to stderr for good
-    with pytest.raises(SystemExit) as leaving:
-        main()
-    os.dup2(stdout, 1)
-    os.close(stdout)
-    out, err = capfd.readouterr()
-    return int(leaving.value.code or 0), out, err
 
 
 def test_a_dry_run_lists_items_and_writes_nothing_but_the_plan(holed, monkeypatch, capfd) -> None:
