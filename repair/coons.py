@@ -1,7 +1,7 @@
 """Discrete bilinear Coons patches, many at a time.
 
-Source: Hamann, Jean, Razdan, section 3 (HJR 4); with equidistant boundary parameters u_I0 = u_IN = I/M, so that
-u_IJ = I/M and v_IJ = J/N.
+Source: Hamann, Jean, Razdan, section 3 (HJR 4); opposite sides have the same parameters u_I0 = u_IN and v_0J = v_MJ,
+so that u_IJ and v_IJ are these: I/M and J/N where none are given.
 """
 
 from __future__ import annotations
@@ -12,21 +12,24 @@ from patchwright.models.arrays import Array
 from patchwright.models.errors import GeometryError
 
 
-def coons_grid(south: Array, north: Array, west: Array, east: Array) -> Array:
+def coons_grid(
+    south: Array, north: Array, west: Array, east: Array, *, u: Array | None = None, v: Array | None = None
+) -> Array:
     """The points of the Coons patches of four boundary polylines each.
 
     Parameters
     ----------
     south, north : (..., M + 1, 3) boundary points at v = 0 and v = 1, along u
     west, east : (..., N + 1, 3) boundary points at u = 0 and u = 1, along v
+    u, v : (M + 1,), (N + 1,) parameters of the boundary points, from 0 to 1; default equidistant
 
     Returns
     -------
     (..., M + 1, N + 1, 3), axis -3 along u.
     """
     m, n = south.shape[-2] - 1, west.shape[-2] - 1
-    u = (np.arange(m + 1) / m)[:, None, None]
-    v = (np.arange(n + 1) / n)[None, :, None]
+    u = (np.arange(m + 1) / m if u is None else u)[:, None, None]
+    v = (np.arange(n + 1) / n if v is None else v)[None, :, None]
     ruled_u = (1 - u) * west[..., None, :, :] + u * east[..., None, :, :]
     ruled_v = (1 - v) * south[..., :, None, :] + v * north[..., :, None, :]
     x00, xm0 = south[..., 0, :], south[..., -1, :]
