@@ -18,16 +18,15 @@ from patchwright.models.cad.capping import FreeLoop
 from patchwright.models.cad.editing import in_chains, with_loops
 from patchwright.models.errors import GeometryError
 from patchwright.models.extension import curve_on
-from patchwright.models.knots import divided
 from patchwright.models.nurbs_curve import NurbsCurve
 from patchwright.models.surface import Surface
 from patchwright.models.topology import EdgeUse, Topology
 from patchwright.repair.cad_draft import RIM_SHARE, Change, Draft, Limits, apart
-from patchwright.repair.pcurves import below, fitted, parameters, widened
+from patchwright.repair.loop_shape import in_step, outer_first, simple
+from patchwright.repair.meeting import CROSSING, STEPS, farthest, feet, on_both
+from patchwright.repair.pcurves import below, fitted, widened
 from patchwright.repair.result import Rung
 
-STEPS = 30
-CROSSING = 0.05  # sine of the least angle at which two surfaces cross well enough to be trimmed there
 GROWTH = 5.0  # of the gap: how far an edge's corner may run along its neighbours
 
 
@@ -99,7 +98,7 @@ def _around(
     if moved is None:
         return None
     taken = _taken(moved[0], face, removed, steps, width, centre, limits)
-    if taken is None or not all(_simple(taken[0], one) for one in (face, *moved[1])):
+    if taken is None or not all(simple(taken[0].topology.loops[one]) for one in (face, *moved[1])):
         return None
     change = replace(
         taken[1],
@@ -148,7 +147,7 @@ def _taken(
     added, worst = [], 0.0
     for edge, reverse in steps:
         curve = topology.curves[edge]
-        if _off(surface, curve(np.linspace(*curve.domain, 17))) > limits.on:
+        if farthest(surface, curve(np.linspace(*curve.domain, 17))) > limits.on:
             return None
         found = below(surface, curve, limits.fit)
         if found.residual > limits.on:
@@ -159,12 +158,12 @@ def _taken(
     chains = in_chains([*kept, *added], topology.ends)
     if chains is None:
         return None
-    loops = _outer_first([_in_step(surface, chain) for chain in chains])
+    loops = outer_first([in_step(surface, chain) for chain in chains])
     if loops is None:
         return None
     points = np.concatenate([use.pcurve.control_points for loop in loops for use in loop])
     grown = draft.with_surfaces({face: widened(surface, points)}, with_loops(topology, {face: loops}), same=True)
-    if not _simple(grown, face):
+    if not simple(loops):
         return None
     change = Change(
         "face trimmed again by its neighbours' edges",
@@ -178,102 +177,6 @@ def _taken(
     return grown, change
 
 
-def _off(surface: Surface, points: Array) -> float:
-    feet, _ = _feet(surface, points)
-    return float(np.linalg.norm(feet - points, axis=1).max())
-
-
-def _feet(surface: Surface, points: Array) -> tuple[Array, Array]:
-    """Feet of points on the surface carried on, and unit normals there."""
-    uv = parameters(surface, points)
-    wide = widened(surface, uv)
-    low, high = np.array(wide.domain).T
-    u, v = np.clip(uv, low, high).T
-    normal = np.cross(wide(u, v, (1, 0)), wide(u, v, (0, 1)))
-    size = np.linalg.norm(normal, axis=1, keepdims=True)
-    return wide(u, v), np.divide(normal, size, out=np.zeros_like(normal), where=size > 0.0)
-
-
-def _in_step(surface: Surface, chain: list[EdgeUse]) -> list[EdgeUse]:
-    """The uses with their pcurves a whole turn on where that makes each start where the last ends."""
-    from patchwright.models import Cone, Cylinder, Sphere, Torus
-
-    periods = np.array(
-        [
-            2.0 * np.pi if isinstance(surface, Cylinder | Cone | Sphere | Torus) else 0.0,
-            2.0 * np.pi if isinstance(surface, Torus) else 0.0,
-        ]
-    )
-    if not periods.any():
-        return chain
-    out, at = [], None
-    for use in chain:
-        points = use.pcurve.control_points
-        first, last = (points[-1], points[0]) if use.reversed else (points[0], points[-1])
-        turn = np.zeros(2)
-        if at is not None:
-            turn = periods * np.round(np.divide(at - first, periods, out=np.zeros(2), where=periods > 0.0))
-        if turn.any():
-            pcurve = NurbsCurve(use.pcurve.degree, use.pcurve.knots, points + turn, use.pcurve.weights)
-            use = replace(use, pcurve=pcurve)
-        out.append(use)
-        at = last + turn
-    return out
-
-
-def _polygon(loop: list[EdgeUse] | tuple[EdgeUse, ...]) -> Array:
-    """(k, 2) the loop in the surface's parameters."""
-    rows = []
-    for use in loop:
-        t = divided(use.pcurve.breaks, max(2, 16 // (len(use.pcurve.breaks) - 1)))
-        uv = use.pcurve(t)
-        rows.append((uv[::-1] if use.reversed else uv)[:-1])
-    return np.concatenate(rows)
-
-
-def _area(polygon: Array) -> float:
-    x, y = (polygon - polygon[0]).T
-    return 0.5 * float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
-
-
-def _outer_first(loops: list[list[EdgeUse]]) -> tuple[tuple[EdgeUse, ...], ...] | None:
-    """The loops with the one that encloses the most in front; None unless it alone runs counter-clockwise."""
-    areas = [_area(_polygon(loop)) for loop in loops]
-    order = sorted(range(len(loops)), key=lambda i: -areas[i])
-    if areas[order[0]] <= 0.0 or any(areas[i] >= 0.0 for i in order[1:]):
-        return None
-    return tuple(tuple(loops[i]) for i in order)
-
-
-def _simple(draft: Draft, face: int) -> bool:
-    """Whether no two chords of the face's loops cross in its parameters."""
-    polygons = [_polygon(loop) for loop in draft.topology.loops[face]]
-    a = np.concatenate(polygons)
-    b = np.concatenate([np.roll(p, -1, axis=0) for p in polygons])
-    scale = np.maximum(np.ptp(a, axis=0), np.finfo(float).tiny)
-    a, b = a / scale, b / scale
-    keep = np.linalg.norm(b - a, axis=1) > 1e-9
-    a, b = a[keep], b[keep]
-
-    def turn(p: Array, q: Array, r: Array) -> Array:
-        return np.asarray(
-            (q[..., 0] - p[..., 0]) * (r[..., 1] - p[..., 1]) - (q[..., 1] - p[..., 1]) * (r[..., 0] - p[..., 0])
-        )
-
-    one, two = (a[:, None], b[:, None]), (a[None], b[None])
-    s1, s2 = turn(*one, two[0]), turn(*one, two[1])
-    s3, s4 = turn(*two, one[0]), turn(*two, one[1])
-    tiny = 1e-9
-    crosses = (s1 * s2 < 0.0) & (s3 * s4 < 0.0) & (np.minimum(np.abs(s1), np.abs(s2)) > tiny**2)
-    crosses &= (
-        (np.abs(s1) > tiny * 1e-3)
-        & (np.abs(s2) > tiny * 1e-3)
-        & (np.abs(s3) > tiny * 1e-3)
-        & (np.abs(s4) > tiny * 1e-3)
-    )
-    return not bool(crosses.any())
-
-
 def _moved(
     draft: Draft, face: int, steps: list[tuple[int, bool]], owner: dict[int, int], width: float, limits: Limits
 ) -> tuple[Draft, tuple[int, ...], float] | None:
@@ -282,7 +185,7 @@ def _moved(
     ring = {edge for edge, _ in steps}
     corners = {int(v) for edge in ring for v in topology.ends[edge]}
     at = np.array(sorted(corners))
-    off = {int(v): _off(target, topology.vertices[v][None]) for v in at}
+    off = {int(v): farthest(target, topology.vertices[v][None]) for v in at}
     curves, vertices = list(topology.curves), topology.vertices.copy()
     touched: set[int] = set()  # edges whose curve is another now
     try:
@@ -300,7 +203,7 @@ def _moved(
         for edge in sorted(ring):
             curve = topology.curves[edge]
             stays = all(off[int(v)] <= limits.fit for v in topology.ends[edge])
-            if stays and _off(target, curve(np.linspace(*curve.domain, 17))) <= limits.fit:
+            if stays and farthest(target, curve(np.linspace(*curve.domain, 17))) <= limits.fit:
                 continue
             ends = vertices[topology.ends[edge]] - topology.vertices[topology.ends[edge]]
             new = _crossing(draft.surface(owner[edge]), target, curve, ends, limits)
@@ -361,7 +264,7 @@ def _corner(
         curve = topology.curves[beside[0]]
         end = 0 if topology.ends[beside[0], 0] == corner else 1
         t = np.array([curve.domain[end]])
-        place = _newton(draft.surface(owner[beside[0]]), target, curve(t), curve(t, 1), limits)
+        place = on_both(draft.surface(owner[beside[0]]), target, curve(t), curve(t, 1), limits)
         return None if place is None else (place[0], -1, curve)
     curve = topology.curves[radial[0]]
     end = 0 if topology.ends[radial[0], 0] == corner else 1
@@ -385,7 +288,7 @@ def _met(curve: NurbsCurve, end: int, target: Surface, most: float, limits: Limi
     t = at
     for _ in range(STEPS):
         point, slope = longer(np.array([t])), longer(np.array([t]), 1)[0]
-        foot, normal = _feet(target, point)
+        foot, normal, _ = feet(target, point)
         rise = float(slope @ normal[0])
         if abs(rise) < CROSSING * float(np.linalg.norm(slope)):
             return None
@@ -395,7 +298,7 @@ def _met(curve: NurbsCurve, end: int, target: Surface, most: float, limits: Limi
             return None
         if abs(step) * speed <= 1e-3 * limits.fit:
             break
-    closer = float(np.linalg.norm(_feet(target, longer(np.array([t])))[0] - longer(np.array([t]))))
+    closer = float(np.linalg.norm(feet(target, longer(np.array([t])))[0] - longer(np.array([t]))))
     shortest = 1e-6 * (high - low)
     sound = (t < high - shortest) if end == 0 else (t > low + shortest)
     return t if closer <= limits.fit and sound else None
@@ -410,44 +313,14 @@ def _crossing(own: Surface, target: Surface, curve: NurbsCurve, ends: Array, lim
         share = ((t - t0) / (t1 - t0))[:, None]
         return curve(t) + (1.0 - share) * ends[0] + share * ends[1], curve(t, 1) + slope
 
-    places = _newton(own, target, *guide(np.linspace(t0, t1, 17)), limits)
+    places = on_both(own, target, *guide(np.linspace(t0, t1, 17)), limits)
     if places is None:
         return None
 
     def place(t: Array) -> Array:
-        found = _newton(own, target, *guide(t), limits)
+        found = on_both(own, target, *guide(t), limits)
         if found is None:
             raise GeometryError("two surfaces do not cross all along an edge")
         return found
 
     return fitted(place, curve, limits.fit)
-
-
-def _newton(a: Surface, b: Surface, start: Array, along: Array, limits: Limits) -> Array | None:
-    """(k, 3) points on both surfaces in the planes square to `along` (k, 3) through `start` (k, 3)."""
-    size = np.linalg.norm(along, axis=1, keepdims=True)
-    if (size == 0.0).any():
-        return None
-    along = along / size
-    x = start.copy()
-    for _ in range(STEPS):
-        (feet_a, normal_a), (feet_b, normal_b) = _feet(a, x), _feet(b, x)
-        rows = np.stack([normal_a, normal_b, along], axis=1)
-        if np.abs(np.linalg.det(rows)).min() < CROSSING:
-            return None
-        right = np.stack(
-            [
-                np.einsum("ij,ij->i", feet_a - x, normal_a),
-                np.einsum("ij,ij->i", feet_b - x, normal_b),
-                np.einsum("ij,ij->i", start - x, along),
-            ],
-            axis=1,
-        )
-        step = np.linalg.solve(rows, right[..., None])[..., 0]
-        x += step
-        if np.linalg.norm(x - start, axis=1).max() > limits.reach:
-            return None
-        if np.linalg.norm(step, axis=1).max() <= 1e-3 * limits.fit:
-            break
-    off = max(float(np.linalg.norm(_feet(s, x)[0] - x, axis=1).max()) for s in (a, b))
-    return x if off <= limits.fit else None
