@@ -114,7 +114,7 @@ def on_all(surfaces: Sequence[Surface], curves: Sequence[NurbsCurve], start: Arr
             return x
         step = np.linalg.lstsq(np.array(rows), np.array(right), rcond=TOUCH)[0]
         size = float(np.linalg.norm(step))
-        x += step * min(1.0, limits.reach / max(size, np.finfo(float).tiny))
+        x += step if size <= limits.reach else step * (limits.reach / size)
         if size <= 1e-3 * limits.fit:
             break
     return x

@@ -26,6 +26,7 @@ from patchwright.ssi.closed_forms.inversion import TURN, Analytic, inverted
 DEGREE = 5
 FIRST, MOST = 12, 768  # points per piece
 BETWEEN = 4  # probes between two points
+POLE = 1e-9  # of the largest speed along a curve: where parameter lines run slower, they have no length
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -71,14 +72,33 @@ def parameters(surface: Surface, points: Array, near: Array | None = None) -> Ar
     """(k, 2) parameters of the points' feet, continuous along the row where the surface is periodic."""
     if isinstance(surface, NurbsSurface):
         feet = surface.closest(points)
-        return np.stack([feet.u, feet.v], axis=1)
-    uv = inverted(cast(Analytic, surface), points)[0]
+        uv = np.stack([feet.u, feet.v], axis=1)
+        for k, order in enumerate(((1, 0), (0, 1))):
+            _from_beside(uv, k, np.linalg.norm(surface(uv[:, 0], uv[:, 1], order), axis=1))
+        return uv
+    uv = np.array(inverted(cast(Analytic, surface), points)[0])
+    if isinstance(surface, Sphere):
+        _from_beside(uv, 0, surface.radius * np.cos(uv[:, 1]))
+    elif isinstance(surface, Cone):
+        _from_beside(uv, 0, surface.radius(uv[:, 1]))
     for k in (0, 1):
         if _period(surface, k):
             uv[:, k] = np.unwrap(uv[:, k])
             if near is not None:
                 uv[:, k] += TURN * np.round((near[k] - uv[0, k]) / TURN)
     return np.asarray(uv)
+
+
+def _from_beside(uv: Array, k: int, size: Array) -> None:
+    """Parameter k of rows of uv (k, 2) where its lines have no length, which leaves it open, set to the next row's."""
+    clear = np.flatnonzero(np.abs(size) > POLE * np.abs(size).max(initial=0.0))
+    if not len(clear) or len(clear) == len(uv):
+        return
+    place = np.arange(len(uv))
+    after = np.minimum(np.searchsorted(clear, place), len(clear) - 1)
+    before = np.maximum(after - 1, 0)
+    nearer = np.where(np.abs(clear[before] - place) < np.abs(clear[after] - place), before, after)
+    uv[:, k] = uv[clear[nearer], k]
 
 
 def widened(surface: Surface, uv: Array) -> Surface:

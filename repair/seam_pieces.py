@@ -171,16 +171,16 @@ def seams(draft: Draft, whole: Cut, reach: float) -> list[Seam]:
     used: set[Piece] = set()
     out = []
     for edge in sorted(whole.pieces, key=lambda e: (-len(whole.pieces[e]), e)):
-        run: list[Piece] = []
-        for piece in (*whole.pieces[edge], None):
-            if piece is not None and (piece in used or piece not in partner):
-                piece = None
-            if run and (piece is None or not _plain(draft, whole, edge, run[-1], piece, partner)):
-                out.append(_seam(curves, run, partner, best))
-                used |= {*run, *(partner[p] for p in run)}
-                run = []
-            if piece is not None and piece not in used:
-                run.append(piece)
+        runs: list[list[Piece]] = []
+        for piece in whole.pieces[edge]:
+            if piece not in partner or piece in used:
+                continue
+            if runs and runs[-1][-1].t1 == piece.t0 and _plain(draft, whole, edge, runs[-1][-1], piece, partner):
+                runs[-1].append(piece)
+            else:
+                runs.append([piece])
+            used |= {piece, partner[piece]}
+        out += [_seam(curves, run, partner, best) for run in runs]
     return out
 
 
