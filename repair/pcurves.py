@@ -24,7 +24,8 @@ from patchwright.models.surface import Surface
 from patchwright.ssi.closed_forms.inversion import TURN, Analytic, inverted
 
 DEGREE = 5
-FIRST, MOST = 12, 768  # points per piece
+FIRST, MOST = 12, 768  # points per piece at first, and on all pieces when no more are tried
+KNOT_PROBES = 8  # per span of a pcurve, where its crossings of knot lines are looked for
 BETWEEN = 4  # probes between two points
 POLE = 1e-9  # of the largest speed along a curve: where parameter lines run slower, they have no length
 
@@ -52,20 +53,54 @@ def below(surface: Surface, curve: NurbsCurve, accuracy: float, near: Array | No
         flat = (curve.control_points - surface.origin) @ np.stack([surface.xdir, surface.ydir], axis=1)
         found = NurbsCurve(curve.degree, curve.knots, flat, curve.weights)
         return _judged(surface, curve, found, divided(curve.breaks, 8))
-    straight = _straight(surface, curve, near, accuracy)
+    straight = _straight(surface, curve, near, accuracy) or _affine(surface, curve)
     if straight is not None:
         return straight
+    smooth, every = _smooth_pieces(curve), list(pairwise(curve.breaks.tolist()))
+    found = _refined(surface, curve, accuracy, near, smooth)
+    if (
+        found.residual > accuracy and len(smooth) < len(every) <= MOST // FIRST
+    ):  # its knots may be what stands in the way
+        other = _refined(surface, curve, accuracy, near, every)
+        found = other if other.residual < found.residual else found
+    return found
+
+
+def _refined(
+    surface: Surface, curve: NurbsCurve, accuracy: float, near: Array | None, pieces: list[tuple[float, float]]
+) -> Below:
+    """The image piece by piece, through more and more points."""
     count, last = FIRST, np.inf
     while True:
-        sites = [_sites(a, b, count) for a, b in _smooth_pieces(curve)]
+        sites = [_sites(a, b, count) for a, b in pieces]
         uv = parameters(surface, curve(np.concatenate(sites)), near)
         splits = np.cumsum([len(s) for s in sites])[:-1]
         made = joined([spline(t, values) for t, values in zip(sites, np.split(uv, splits), strict=True)])
         probes = divided(np.unique(np.concatenate(sites)), BETWEEN)
         result = _judged(surface, curve, made, probes)
-        if result.residual <= accuracy or count >= MOST or result.residual > 0.5 * last:
+        if result.residual <= accuracy or count * len(pieces) >= MOST or result.residual > 0.5 * last:
             return result  # as near as wanted, or more points do not bring it nearer: the curve is off the surface
         last, count = result.residual, 2 * count
+
+
+def _affine(surface: Surface, curve: NurbsCurve) -> Below | None:
+    """The image of a curve of a NURBS that is a parallelogram, which carries it exactly."""
+    if not isinstance(surface, NurbsSurface) or surface.degree != (1, 1) or surface.rational:
+        return None
+    net = surface.control_points
+    if net.shape[:2] != (2, 2):
+        return None
+    along, across = net[1, 0] - net[0, 0], net[0, 1] - net[0, 0]
+    size = float(np.abs(net).max())
+    if np.abs(net[1, 1] - net[0, 0] - along - across).max() > 1e-15 * size:
+        return None
+    share = np.linalg.lstsq(np.stack([along, across], axis=1), (curve.control_points - net[0, 0]).T, rcond=None)[0].T
+    low, high = np.array(surface.domain).T
+    made = NurbsCurve(curve.degree, curve.knots, low + share * (high - low), curve.weights)
+    uv = made(divided(curve.breaks, 8))
+    if (uv < low).any() or (uv > high).any():
+        return None
+    return _judged(surface, curve, made, divided(curve.breaks, 8))
 
 
 def parameters(surface: Surface, points: Array, near: Array | None = None) -> Array:
@@ -198,22 +233,62 @@ def joined(pieces: list[NurbsCurve]) -> NurbsCurve:
     return NurbsCurve(p, knots, points)
 
 
-def fitted(place: Callable[[Array], Array], like: NurbsCurve, accuracy: float) -> NurbsCurve:
-    """The spline through `place(t)`, (k, d) at parameters (k,), with the range and the corners of the curve `like`."""
+def fitted(
+    place: Callable[[Array], Array], like: NurbsCurve, accuracy: float, corners: Array | None = None
+) -> NurbsCurve:
+    """The spline through `place(t)`, (k, d) at parameters (k,), with the range and the corners of the curve `like`.
+
+    Where that is not near enough, pieces between all its knots and the parameters `corners` are tried.
+    """
+    smooth = _smooth_pieces(like)
+    every = list(pairwise(np.union1d(like.breaks, [] if corners is None else corners).tolist()))
+    made, off = _through(place, smooth, accuracy)
+    if off > accuracy and len(smooth) < len(every) <= MOST // FIRST:
+        other, closer = _through(place, every, accuracy)
+        made = other if closer < off else made
+    return made
+
+
+def _through(
+    place: Callable[[Array], Array], pieces: list[tuple[float, float]], accuracy: float
+) -> tuple[NurbsCurve, float]:
+    """The spline through more and more places piece by piece, and its largest distance from those between."""
     count, last = FIRST, np.inf
     while True:
-        sites = [_sites(a, b, count) for a, b in _smooth_pieces(like)]
+        sites = [_sites(a, b, count) for a, b in pieces]
         splits = np.cumsum([len(s) for s in sites])[:-1]
         values = np.split(place(np.concatenate(sites)), splits)
         line = _line(np.concatenate(sites), np.concatenate(values))
         if line is not None:
-            return line
+            return line, 0.0
         made = joined([spline(t, some) for t, some in zip(sites, values, strict=True)])
         probes = divided(np.unique(np.concatenate(sites)), BETWEEN)
         off = float(np.linalg.norm(made(probes) - place(probes), axis=1).max())
-        if off <= accuracy or count >= MOST or off > 0.5 * last:
-            return made
+        if off <= accuracy or count * len(pieces) >= MOST or off > 0.5 * last:
+            return made, off
         last, count = off, 2 * count
+
+
+def knots_met(surface: Surface, pcurve: NurbsCurve) -> Array:
+    """The parameters where a pcurve crosses knot lines of a NURBS surface, where its image is less smooth."""
+    if not isinstance(surface, NurbsSurface):
+        return np.zeros(0)
+    t = divided(pcurve.breaks, KNOT_PROBES)
+    uv, out = pcurve(t), []
+    for k, breaks in enumerate(surface.breaks):
+        value = uv[:, k]
+        for knot in breaks[1:-1].tolist():
+            where = np.flatnonzero((value[:-1] - knot) * (value[1:] - knot) < 0.0)
+            low, high = t[where], t[where + 1]
+            sign = np.sign(value[where] - knot)
+            for _ in range(50):
+                middle = 0.5 * (low + high)
+                before = (pcurve(middle)[:, k] - knot) * sign > 0.0
+                low, high = np.where(before, middle, low), np.where(before, high, middle)
+            out.append(0.5 * (low + high))
+    found = np.unique(np.concatenate(out)) if out else np.zeros(0)
+    clear = 1e-6 * (t[-1] - t[0])
+    return found[np.abs(found[:, None] - pcurve.breaks[None]).min(axis=1, initial=np.inf) > clear]
 
 
 def _line(t: Array, values: Array) -> NurbsCurve | None:

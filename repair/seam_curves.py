@@ -24,11 +24,12 @@ from patchwright.models.surface import Surface
 from patchwright.models.topology import EdgeUse
 from patchwright.repair.cad_draft import Draft, Limits
 from patchwright.repair.meeting import CROSSING, across, farthest, feet, on_both
-from patchwright.repair.pcurves import fitted, spline
+from patchwright.repair.pcurves import fitted, knots_met, spline
 from patchwright.repair.seam_pieces import Piece, Seam
 
 SAMPLES = 33
 EXACT = 0.02  # of the distance at which an edge lies on a surface: nearer than this it lies there to round-off
+FINE = 10.0  # of the rungs' finest length: how near a new edge follows its surfaces
 PER_SPAN = 3  # points of the first guess per control point of the leading edge
 MOST = 400  # points of the first guess
 FAR = 1e-7  # of a domain: a pcurve this near its border runs along it
@@ -104,7 +105,8 @@ def track(draft: Draft, piece: Piece, uses: dict[int, EdgeUse], limits: Limits) 
         border = _border(surface, use.pcurve)
         if border is not None:
             return border.restricted(piece.t0, piece.t1)
-        return fitted(image, curve.restricted(piece.t0, piece.t1), limits.fit)
+        below = use.pcurve.restricted(piece.t0, piece.t1)
+        return fitted(image, below, FINE * limits.fit, knots_met(surface, below))
     whole = (piece.t0, piece.t1) == curve.domain
     return curve if whole else curve.restricted(piece.t0, piece.t1)
 
@@ -176,7 +178,7 @@ def reattached(curve: NurbsCurve, ends: Array, surfaces: tuple[Surface, ...], li
     probes = np.linspace(t0, t1, SAMPLES)
     crossing = len(surfaces) == 2 and bool(across(*surfaces, curve(probes)).min() >= CROSSING)
     try:
-        made = fitted(place, curve, limits.fit)
+        made = fitted(place, curve, FINE * limits.fit)
     except GeometryError:
         return None
     points = made(probes)
@@ -232,7 +234,7 @@ def _crossing(own: Surface, other: Surface, one: Judged, ends: Array, limits: Li
 
     try:
         smooth = NurbsCurve(1, np.array([0.0, 0.0, along[-1], along[-1]]), np.stack([places[0], places[-1]]))
-        made = fitted(place, smooth, limits.fit)
+        made = fitted(place, smooth, FINE * limits.fit)
     except GeometryError:
         return None
     at = made(np.array(made.domain))
