@@ -1,4 +1,4 @@
-"""The command line: `patchwright check | repair | intersect | reparam | convert | curves | run | demo`.
+"""The command line: `patchwright check | repair | intersect | reparam | approximate | convert | curves | run | demo`.
 
 Only here do errors become sentences and exit codes: 0 done, 1 defects found, refused or not converged, 2 bad usage or
 input, 3 internal failure. Heavy packages are imported inside the commands, so that `--help` answers at once.
@@ -247,6 +247,47 @@ def reparam(
     else:
         _say("\n".join(reparam_lines(result)))
     raise typer.Exit(DONE if result.complete else FOUND)
+
+
+@app.command()
+def approximate(
+    file: Annotated[Path | None, typer.Argument(help="Geometry to lay patches on.", show_default=False)] = None,
+    patches: Annotated[
+        Path | None, typer.Option("--patches", help="TOML: four sides or corners for every patch.", show_default=False)
+    ] = None,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="STEP or IGES, or a folder for figures.", show_default=False)
+    ] = None,
+    tolerance: Annotated[float | None, typer.Option(help="Length in model units [1e-4 of the diagonal].")] = None,
+    paper_figures: Annotated[
+        bool, typer.Option("--paper-figures", help="The paper's repair examples as pictures and numbers.")
+    ] = False,
+    bodies: Annotated[bool, typer.Option(help="With --paper-figures: car body and aircraft too.")] = True,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Lay bicubic patches with given sides over a dirty geometry; exit code 1 when one is not within the tolerance."""
+    if paper_figures:
+        from patchwright.pipelines.paper_patches import run_paper_figures
+
+        if file or patches:
+            raise typer.BadParameter("--paper-figures makes its own shapes; leave the file and --patches out")
+        told, lines = run_paper_figures(output or Path("paper-figures"), bodies=bodies, terminal=_terminal(quiet))
+        if json:
+            _say_json(told)
+        else:
+            _say("\n".join(lines))
+        raise typer.Exit(DONE)
+    from patchwright.pipelines.approximate import approximate_json, approximate_lines, run_approximate
+
+    if file is None or patches is None or output is None:
+        raise typer.BadParameter("needs a geometry, --patches FILE and -o FILE")
+    run = run_approximate(file, patches, output, tolerance=tolerance, terminal=_terminal(quiet))
+    if json:
+        _say_json(approximate_json(run))
+    else:
+        _say("\n".join(approximate_lines(run)))
+    raise typer.Exit(DONE if run.converged else FOUND)
 
 
 @app.command()

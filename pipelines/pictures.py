@@ -94,7 +94,7 @@ def _coordinates(where: Array) -> str:
 
 
 def _after(study: Study, repaired: Repaired) -> list[Scene]:
-    body, colours, borders = _output_surface(repaired)
+    body, colours, borders = output_surface(repaired)
     scene = Scene(study.folder / "after.png", f"after: {repaired.verdict.value}", body.bounds)
     scene.surface(body, colours=colours).lines(borders, colour="#33475a", width=1.2)
     scenes = [scene]
@@ -109,7 +109,7 @@ def _after(study: Study, repaired: Repaired) -> list[Scene]:
     return scenes
 
 
-def _output_surface(repaired: Repaired) -> tuple[Triangulation, Any, Array]:
+def output_surface(repaired: Repaired) -> tuple[Triangulation, Any, Array]:
     """Triangles of the output, their colours by rung, and the patch borders as segments."""
     if repaired.network is None:
         body = repaired.triangulation

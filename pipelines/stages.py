@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from patchwright.models.errors import ParameterError
@@ -54,7 +55,7 @@ def _repair(study: Study, options: dict[str, Any], report: Report) -> Outcome:
         study.assembly,
         scope=options["scope"],
         openings=options["openings"],
-        layout=_layout(options["layout"]),
+        layout=_layout(options["layout"], study),
         tolerance=study.tolerance,
         domain=study.domain,
         plan=study.plan,
@@ -66,11 +67,17 @@ def _repair(study: Study, options: dict[str, Any], report: Report) -> Outcome:
     return replace(study, repaired=repaired, notes=notes), figures
 
 
-def _layout(wanted: str) -> QuadLayout | str:
-    """The layout of a file, or "auto"."""
+def _layout(wanted: str, study: Study) -> QuadLayout | list[Any] | str:
+    """The layout of a file, the patches of a list of patches, or "auto"."""
+    from patchwright.pipelines.patch_list import load_patches
     from patchwright.repair.layout_file import load_layout
 
-    return wanted if wanted == AUTO else load_layout(wanted)
+    if wanted == AUTO:
+        return wanted
+    if not wanted.lower().endswith(".toml"):
+        return load_layout(wanted)
+    patches = load_patches(Path(wanted), study.assembly, study.tolerance.fit).patches
+    return [[p.sides.south.curve, p.sides.east.curve, p.sides.north.curve, p.sides.west.curve] for p in patches]
 
 
 def _write(study: Study, options: dict[str, Any], report: Report) -> Outcome:

@@ -1,7 +1,7 @@
 """Gap filling: offsets for the patch points whose projection found no surface.
 
-Two methods share one signature. "smooth" (default) solves one thin-plate spline per patch over the found projections
-around the gaps, smoothed by the data's own noise. "hardy" is the paper's: per missing point, Hardy's reciprocal
+Two methods share one signature. "smooth" (default) solves one thin-plate spline per connected gap over the found
+projections around it, smoothed by the data's own noise. "hardy" is the paper's: per missing point, Hardy's reciprocal
 multiquadric through the K found projections nearest by index (HJR 11-13).
 
 Measured on the test function of the design notes: see `benchmarks/bench_filling.py`.
@@ -19,8 +19,9 @@ from patchwright.models.errors import ParameterError
 
 HARDY_EXPONENT = 0.001  # gamma of HJR 12
 HARDY_NEIGHBOURS = 8  # K of HJR 12, 5 to 10 in the paper
-RING = 4  # grid rows of found projections around a gap that carry the smooth fill
+RING = 4  # grid rows of found projections around a gap that carry the smooth fill, or the gap's own width if more
 OVERSHOOT = 1.0  # spreads of the found projections: how far beyond them a smooth fill may go
+MOST_SITES = 4000  # of one spline: solving it costs the cube of its sites
 ENOUGH = 3  # fewest found projections a thin-plate spline can stand on
 
 
@@ -68,31 +69,49 @@ def _collinear(sites: IntArray) -> bool:
 
 
 def _smooth(offsets: Array, found: BoolArray, noise: float) -> Array:
-    """One thin-plate spline through (or, with noise, near) the projections within `RING` rows of a gap.
+    """One thin-plate spline per connected gap, through (or, with noise, near) the projections round it.
 
-    Such a spline grows without bound away from its data: it is cut off `OVERSHOOT` spreads beyond them.
+    Such a spline grows without bound away from its data: it is cut off `OVERSHOOT` spreads beyond them. Of very many
+    projections every k-th is taken, first of those that do not touch the gap.
     """
     from scipy.interpolate import RBFInterpolator
-    from scipy.ndimage import binary_dilation
+    from scipy.ndimage import binary_dilation, distance_transform_cdt, find_objects, label
 
     m, n = offsets.shape
-    ring = found & binary_dilation(~found, structure=np.ones((3, 3), dtype=bool), iterations=RING)
-    if ring.sum() < ENOUGH or _collinear(np.argwhere(ring)):
-        ring = found
     scale = np.array([max(m - 1, 1), max(n - 1, 1)], dtype=np.float64)
-    sites, missing = np.argwhere(ring) / scale, np.argwhere(~found) / scale
-    values = offsets[ring]
-    centre, spread = values.mean(), float(np.ptp(values))
+    whole = np.ones((3, 3), dtype=bool)
+    gaps, count = label(~found, structure=whole)
+    depth = distance_transform_cdt(~found, metric="chessboard")
     out = offsets.copy()
-    if spread == 0.0:
-        out[~found] = centre
-        return out
-    # the smoothing parameter is the noise variance in units of the values' own variance
-    smoothing = len(sites) * (noise / spread) ** 2 * 1e-3
-    spline = RBFInterpolator(sites, (values - centre) / spread, kernel="thin_plate_spline", smoothing=smoothing)
-    low, high = values.min() - OVERSHOOT * spread, values.max() + OVERSHOOT * spread
-    out[~found] = np.clip(spline(missing) * spread + centre, low, high)
+    for number, window in enumerate(find_objects(gaps, count), start=1):
+        reach = max(RING, 2 * int(depth[window][gaps[window] == number].max()))
+        low = [max(w.start - reach, 0) for w in window]
+        near = tuple(slice(a, w.stop + reach) for a, w in zip(low, window, strict=True))
+        gap = gaps[near] == number
+        rim = found[near] & binary_dilation(gap, structure=whole)
+        ring = found[near] & ~rim & binary_dilation(gap, structure=whole, iterations=reach)
+        sites = np.concatenate([_thinned(np.argwhere(part)) for part in (rim, ring)]) + low
+        if len(sites) < ENOUGH or _collinear(sites):
+            sites = _thinned(np.argwhere(found))
+        missing = np.argwhere(gap) + low
+        values = offsets[tuple(sites.T)]
+        centre, spread = values.mean(), float(np.ptp(values))
+        if spread == 0.0:
+            out[tuple(missing.T)] = centre
+            continue
+        # the smoothing parameter is the noise variance in units of the values' own variance
+        smoothing = len(sites) * (noise / spread) ** 2 * 1e-3
+        spline = RBFInterpolator(
+            sites / scale, (values - centre) / spread, kernel="thin_plate_spline", smoothing=smoothing
+        )
+        least, most = values.min() - OVERSHOOT * spread, values.max() + OVERSHOOT * spread
+        out[tuple(missing.T)] = np.clip(spline(missing / scale) * spread + centre, least, most)
     return out
+
+
+def _thinned(sites: IntArray) -> IntArray:
+    """Every k-th of the sites, so that no more than half of `MOST_SITES` remain."""
+    return sites[:: max(1, -(-2 * len(sites) // MOST_SITES))]
 
 
 def _hardy(offsets: Array, found: BoolArray, noise: float) -> Array:

@@ -71,6 +71,7 @@ def project(
     *,
     region: IntArray | None = None,
     allowed: IntArray | None = None,
+    outermost: bool = False,
 ) -> Projected:
     """Project points along their normals, both ways, onto the tree's triangles.
 
@@ -80,6 +81,8 @@ def project(
     distance : (n,) half the length of each segment (HJR 6)
     tree : over a consistently oriented triangulation; a `TrueGround` has its hits moved on to the true surfaces
     region, allowed : (m,) label of each triangle and (n,) the label each point may land on; None: any
+    outermost : of several admissible hits take the first along the normal from outside, which over crossing sheets
+        follows their outer hull, where the nearest jumps from sheet to sheet
 
     Returns
     -------
@@ -89,7 +92,7 @@ def project(
     b = points - distance[:, None] * normals
     hits = tree.all_hits(a, b)
     facing = tree.triangulation.normals
-    chosen = _choose(hits.offsets, hits.t, hits.triangle, facing, normals, distance, region, allowed)
+    chosen = _choose(hits.offsets, hits.t, hits.triangle, facing, normals, distance, region, allowed, outermost)
     found = chosen >= 0
     pick = np.where(found, chosen, 0)
     t = np.full(len(points), 0.5)
@@ -118,8 +121,9 @@ def _choose(
     distance: Array,
     region: IntArray | None,
     allowed: IntArray | None,
+    outermost: bool,
 ) -> IntArray:
-    """(n,) index of each segment's admissible hit nearest its middle, -1 for none."""
+    """(n,) index of each segment's admissible hit nearest its middle (or its start), -1 for none."""
     count = np.diff(offsets)
     n = len(count)
     best = np.full(n, -1, dtype=np.int64)
@@ -131,7 +135,7 @@ def _choose(
     same = turn > FACING
     if region is not None and allowed is not None:
         same &= (region[triangle] == allowed[ray]) | (allowed[ray] < 0)
-    order = np.lexsort((away, ~same, ray))  # per ray: admissible hits first, nearest first
+    order = np.lexsort((t if outermost else away, ~same, ray))  # per ray: admissible hits first, nearest first
     first = order[np.searchsorted(ray[order], np.flatnonzero(count > 0))]
     first = first[same[first]]
     # local thickness: from the hit to the nearest hit that faces the other way

@@ -125,6 +125,23 @@ class TrueGround:
                 status[some[rest]] = again.status
         return replace(found, points=place, distance=np.linalg.norm(place - query, axis=1)), status
 
+    def normals(self, triangle: IntArray, points: Array) -> Array:
+        """(n, 3) unit normals at points near their triangles: of the true surfaces where a foot is found.
+
+        They face as the triangles do; the triangle's own normal stands where there is no surface or no foot.
+        """
+        from patchwright.models.differential import normals
+
+        out = np.array(self.tree.triangulation.normals[triangle])
+        for some, number, uv in self._by_surface(triangle, points):
+            surface, bounds = self.true.surfaces[number], self.true.bounds[number]
+            made = feet(surface, uv, points[some], self.accuracy, bounds)
+            own = normals(surface, made.uv[:, 0], made.uv[:, 1])
+            good = (made.status <= Outcome.LEFT_DOMAIN) & np.isfinite(own).all(axis=1)
+            turn = np.sign(np.einsum("ij,ij->i", own, out[some]))
+            out[some[good]] = (own * turn[:, None])[good]
+        return out
+
     def on_segments(
         self, triangle: IntArray, points: Array, t: Array, a: Array, b: Array
     ) -> tuple[Array, Array, IntArray]:
