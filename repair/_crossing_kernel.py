@@ -33,7 +33,10 @@ def _height(points: Array, p: int, a: int, nx: float, ny: float, nz: float) -> f
 
 @inner
 def _pierces(points: Array, p: int, q: int, a: int, b: int, c: int, depth: float) -> bool:
-    """Whether the segment p q passes through the inside of a b c, both ends farther than `depth` from its plane."""
+    """Whether the segment p q passes through the inside of a b c, both ends farther than `depth` from its plane.
+
+    A triangle no higher than `depth` has no inside to pass through; the direction of its plane is chance.
+    """
     ux = points[b, 0] - points[a, 0]
     uy = points[b, 1] - points[a, 1]
     uz = points[b, 2] - points[a, 2]
@@ -44,7 +47,11 @@ def _pierces(points: Array, p: int, q: int, a: int, b: int, c: int, depth: float
     ny = uz * vx - ux * vz
     nz = ux * vy - uy * vx
     size = np.sqrt(nx * nx + ny * ny + nz * nz)
-    if size == 0.0:
+    wx = vx - ux
+    wy = vy - uy
+    wz = vz - uz
+    longest = max(ux * ux + uy * uy + uz * uz, vx * vx + vy * vy + vz * vz, wx * wx + wy * wy + wz * wz)
+    if size <= depth * np.sqrt(longest):
         return False
     sp = _height(points, p, a, nx, ny, nz) / size
     sq = _height(points, q, a, nx, ny, nz) / size
@@ -63,7 +70,8 @@ def _pierces(points: Array, p: int, q: int, a: int, b: int, c: int, depth: float
 def crossing(pairs: IntArray, points: Array, triangles: IntArray, depth: float) -> BoolArray:
     """(k,) whether an edge of one triangle passes through the inside of the other.
 
-    Triangles that share an edge do not count; of those that share a vertex the opposite edges are tested.
+    Triangles that share an edge do not count; of those that share a vertex the opposite edges are tested. Triangles no
+    higher than `depth` may pass through others, nothing passes through them.
     """
     found = np.zeros(len(pairs), dtype=np.bool_)
     _crossing(pairs, points, triangles, depth, found)

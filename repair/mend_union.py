@@ -8,7 +8,6 @@ import numpy as np
 
 from patchwright.models.adjacency import Adjacency
 from patchwright.models.arrays import Array, BoolArray, IntArray
-from patchwright.models.errors import GeometryError
 from patchwright.models.triangulation import Triangulation
 from patchwright.repair.bridge import borders_of
 from patchwright.repair.clean import split_non_manifold
@@ -16,7 +15,7 @@ from patchwright.repair.crossings import CROSSING, crossing_pairs
 from patchwright.repair.mend_gaps import fill
 from patchwright.repair.mended import BRIDGED, STRAY_SHARE, Action, Problem, Work, known, middle
 from patchwright.repair.orient import orient
-from patchwright.repair.outer_hull import outer_hull, untangled
+from patchwright.repair.outer_hull import Hull, outer_hull
 from patchwright.repair.untangle import inner_patches, winding
 
 SHEET = 0.4  # a body whose openings take more of its area than this is an open sheet, not a body with openings
@@ -43,8 +42,7 @@ def unite(work: Work, openings: str) -> tuple[Array, ...]:
     is_cap, body = is_cap[solid], body[solid]
     left = _drop_flat(work, body)
     is_cap, body = is_cap[left], np.unique(body[left], return_inverse=True)[1].reshape(-1)
-    is_cap, body = _untangle(work, is_cap, body)
-    hull = outer_hull(work.now, body)
+    hull, is_cap, body = _hull(work, is_cap, body, openings)
     names = {b: work.names(known(work.source[body == b])) for b in {piece.inside for piece in hull.inside} - {-1}}
     for piece in hull.inside:
         named = ", ".join(names.get(piece.inside, ())) or "another body"
@@ -53,7 +51,9 @@ def unite(work: Work, openings: str) -> tuple[Array, ...]:
     for sentence in hull.failed:
         work.problems.append(Problem("union", middle(work.now), work.now.diagonal, sentence))
     if hull.cut.any():
-        reason = f"{int(body.max()) + 1} bodies overlap and become one surface"
+        bodies = int(body.max()) + 1
+        reason = f"{bodies} bodies overlap" if bodies > 1 else "a body passes through itself"
+        reason += " and become one surface" if bodies > 1 else " and is cut where it does"
         some = hull.triangulation.take(hull.cut)
         work.actions.append(Action("unite", "re-trim", middle(some), some.diagonal, 0.0, reason, int(hull.cut.sum())))
     work.follow(hull.triangulation, hull.parents, hull.cut)
@@ -61,6 +61,7 @@ def unite(work: Work, openings: str) -> tuple[Array, ...]:
         left = np.flatnonzero(~is_cap[hull.parents])
         if len(left) < len(work.now):
             work.follow(work.now.take(left), left)
+    work.now = split_non_manifold(work.now)
     _drop_hollows(work)
     if len(lone):
         _join_sheets(work, *sheets)
@@ -82,24 +83,20 @@ def _drop_hollows(work: Work) -> None:
         work.follow(work.now.take(left), left)
 
 
-def _untangle(work: Work, is_cap: BoolArray, body: IntArray) -> tuple[BoolArray, IntArray]:
-    """Bodies that pass through themselves lose what is inside them and fall apart into bodies that a union takes."""
+def _hull(work: Work, is_cap: BoolArray, body: IntArray, openings: str) -> tuple[Hull, BoolArray, IntArray]:
+    """The outer hull of all bodies; where it cannot be told, once more without the patches inside their own body.
+
+    A body that merely crosses a cap that goes again does not pass through itself.
+    """
     pairs = crossing_pairs(work.now, CROSSING * work.tolerance.gap)
     pairs = pairs[body[pairs[:, 0]] == body[pairs[:, 1]]]
-    if not len(pairs):
-        return is_cap, body
-    tangled = np.unique(body[pairs])
-    try:
-        hull = untangled(work.now, body, tangled)
-    except GeometryError:
-        return _without_inner_patches(work, is_cap, body, pairs)
-    names = ", ".join(work.names(known(work.source[np.isin(body, tangled)]))) or "its own body"
-    for piece in hull.inside:
-        real = piece.triangles[~is_cap[piece.triangles]]
-        work.drop("inner surface", f"it lies inside {names}", real, piece.area)
-    work.follow(hull.triangulation, hull.parents, hull.cut)
-    work.now = split_non_manifold(work.now)
-    return is_cap[hull.parents], np.asarray(Adjacency.of(work.now).components())
+    if openings == "keep":
+        pairs = pairs[~is_cap[pairs].any(axis=1)]
+    hull = outer_hull(work.now, body, tangled=np.unique(body[pairs]))
+    if not (hull.failed and len(pairs)):
+        return hull, is_cap, body
+    is_cap, body = _without_inner_patches(work, is_cap, body, pairs)
+    return outer_hull(work.now, body), is_cap, body
 
 
 def _without_inner_patches(

@@ -1,9 +1,10 @@
 """Outer hull: closed bodies that overlap become one closed surface; what lies inside others goes, with a label.
 
-The union is exact (manifold3d, in float64): vertices of the input keep their coordinates to the last bit, triangles
-that no other body crosses stay as they are, and every piece knows the triangle it was cut from. Bodies that touch no
-other are handed through untouched. A body inside another that came facing inward is a cavity and stays. A body that
-passes through itself is no input for that; it is cut along its own intersection curves first (`ssi.outer_hull`).
+The bodies are cut along the exact curves in which they meet each other and themselves (`ssi.outer_hull`): vertices of
+the input keep their coordinates, triangles that nothing crosses stay as they are, and every piece knows the triangle it
+was cut from. Where the cuts are too near each other for that, manifold3d unites the bodies; it takes no body that
+passes through itself. Bodies that touch no other are handed through untouched. A body inside another that came facing
+inward is a cavity and stays.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from patchwright.models.arrays import Array, BoolArray, IntArray
+from patchwright.models.errors import GeometryError
 from patchwright.models.triangulation import Triangulation
 from patchwright.repair.untangle import winding
 from patchwright.ssi.outer_hull import outer_pieces
@@ -57,39 +59,70 @@ Pieces = tuple[Array, IntArray, IntArray]
 """Points (n, 3), triangles (m, 3) and the input triangle each is or was cut from."""
 
 
-def outer_hull(triangulation: Triangulation, body: IntArray, inward: BoolArray | None = None) -> Hull:
-    """Unite the closed, outward bodies; `body` (m,) labels them 0..b-1, `inward` (b,) those that came facing inward."""
+def outer_hull(
+    triangulation: Triangulation,
+    body: IntArray,
+    inward: BoolArray | None = None,
+    tangled: IntArray | None = None,
+) -> Hull:
+    """Unite the closed, outward bodies.
+
+    Parameters
+    ----------
+    body : (m,) the body of each triangle, 0..b-1
+    inward : (b,) those that came facing inward
+    tangled : the bodies that pass through themselves
+    """
     bodies = int(body.max(initial=-1)) + 1
     inward = np.zeros(bodies, dtype=np.bool_) if inward is None else inward
+    crossed = np.zeros(bodies, dtype=np.bool_)
+    if tangled is not None:
+        crossed[tangled] = True
     groups = _groups(triangulation, body, bodies)
     own = _by_body(body, bodies)
     made: list[Pieces | None] = []
     failed: list[str] = []
     for group in groups:
         united = None
-        if len(group) > 1:
+        if len(group) > 1 or crossed[group].any():
             try:
-                united = _unite(triangulation, own, group, inward)
-            except _Refused as refusal:
-                failed.append(str(refusal))
+                united = _cut(triangulation, own, group, inward)
+            except GeometryError as error:
+                try:
+                    united = _united_or_told(triangulation, own, group, inward, crossed, error)
+                except _Refused as refusal:
+                    failed.append(str(refusal))
         made.append(united)
     return _joined(triangulation, own, groups, made, tuple(failed))
 
 
-def untangled(triangulation: Triangulation, body: IntArray, tangled: IntArray) -> Hull:
-    """Each of the closed, outward bodies named in `tangled` cut where it passes through itself, without what is inside.
+def _cut(triangulation: Triangulation, bodies: list[IntArray], group: IntArray, inward: BoolArray) -> Pieces:
+    """The outer hull of some bodies, cut along exact curves.
 
     Raises
     ------
     GeometryError : sheets so near each other that the cuts or the sides cannot be told.
     """
-    groups = [np.array([b]) for b in range(int(body.max(initial=-1)) + 1)]
-    own = _by_body(body, len(groups))
-    made: list[Pieces | None] = [None] * len(groups)
-    for b in tangled.tolist():
-        hull, parent = outer_pieces(triangulation.take(own[b]))
-        made[b] = hull.vertices, hull.triangles, own[b][parent]
-    return _joined(triangulation, own, groups, made, ())
+    own = np.concatenate([bodies[b] for b in group])
+    turned = np.concatenate([np.full(len(bodies[b]), inward[b]) for b in group])
+    some = triangulation.take(own)
+    rows = np.where(turned[:, None], some.triangles[:, ::-1], some.triangles)
+    hull, parent = outer_pieces(replace(some, triangles=rows, uv=None))
+    return hull.vertices, hull.triangles, own[parent]
+
+
+def _united_or_told(
+    triangulation: Triangulation,
+    bodies: list[IntArray],
+    group: IntArray,
+    inward: BoolArray,
+    crossed: BoolArray,
+    error: GeometryError,
+) -> Pieces:
+    """The union by manifold3d, where that takes the bodies."""
+    if crossed[group].any():
+        raise _Refused(f"{len(group)} bodies, some of which pass through themselves, cannot be united: {error}")
+    return _unite(triangulation, bodies, group, inward)
 
 
 def _by_body(body: IntArray, bodies: int) -> list[IntArray]:

@@ -110,10 +110,10 @@ def _numbered(mesh: Triangulation, found: MeshIntersection) -> tuple[IntArray, A
     number[~corner] = len(mesh.vertices) + np.arange(int(np.count_nonzero(~corner)))
     points = np.concatenate([mesh.vertices, found.points[~corner]])
     near = np.unique(np.concatenate([mesh.triangles[np.unique(found.sources[:, 1:])].reshape(-1), number]))
-    return _merged(points, near, len(mesh.vertices))[number], points
+    return merged(points, near, len(mesh.vertices))[number], points
 
 
-def _merged(points: Array, near: IntArray, fixed: int) -> IntArray:
+def merged(points: Array, near: IntArray, fixed: int) -> IntArray:
     """(n,) the lowest number within round-off of each point among `near`, rising; points below `fixed` stay."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
@@ -124,10 +124,10 @@ def _merged(points: Array, near: IntArray, fixed: int) -> IntArray:
     graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(near), len(near)))
     _, label = connected_components(graph, directed=False)
     _, first = np.unique(label, return_index=True)  # the lowest number: a vertex of the input where there is one
-    merged = np.arange(len(points))
+    number = np.arange(len(points))
     fresh = near >= fixed
-    merged[near[fresh]] = near[first[label[fresh]]]
-    return merged
+    number[near[fresh]] = near[first[label[fresh]]]
+    return number
 
 
 def _on_rim(
@@ -207,7 +207,12 @@ def _touched(mesh: Triangulation, edge: IntArray) -> IntArray:
 
 
 def _split(
-    points: Array, lines: IntArray, beside: IntArray, meet: IntArray, rows: IntArray, segment: IntArray
+    points: Array,
+    lines: IntArray,
+    beside: IntArray,
+    meet: IntArray,
+    rows: IntArray,
+    segment: IntArray,
 ) -> tuple[Array, _Lines]:
     """Points where three sheets meet, added; and every segment in the pieces they cut it into."""
     if not len(meet):
@@ -218,18 +223,10 @@ def _split(
     owner = rows[meet[:, 0]]
     other = [np.where(beside[s, 0] == owner, beside[s, 1], beside[s, 0]) for s in (one, two)]
     triple = np.sort(np.stack([owner, *other], axis=1), axis=1)
-    _, first, which = np.unique(triple[cross], axis=0, return_index=True, return_inverse=True)
-    a, b = points[lines[one[cross][first], 0]], points[lines[one[cross][first], 1]]
-    c, d = points[lines[two[cross][first], 0]], points[lines[two[cross][first], 1]]
-    # nearest points of two segments that cross up to round-off
-    normal = np.cross(b - a, d - c)
-    square = np.maximum(np.einsum("ij,ij->i", normal, normal), np.finfo(np.float64).tiny)
-    share = np.clip(np.einsum("ij,ij->i", np.cross(c - a, d - c), normal) / square, 0.0, 1.0)
+    fresh, which = _meeting(points, np.concatenate([lines[one], lines[two]], axis=1)[cross], triple[cross])
     base = len(points)
-    points = np.concatenate([points, a + share[:, None] * (b - a)])
-    new = _merged(points, np.concatenate([np.unique(lines), np.arange(base, len(points))]), base)[
-        base + which.reshape(-1)
-    ]
+    points = np.concatenate([points, fresh])
+    new = merged(points, np.concatenate([np.unique(lines), np.arange(base, len(points))]), base)[base + which]
     on_line = np.concatenate([one[cross], two[cross], one[~cross]])
     vertex = np.concatenate([new, new, meet[~cross, 3]])
     pairs = np.unique(np.stack([on_line, vertex], axis=1), axis=0)
@@ -245,6 +242,44 @@ def _split(
     pieces = np.stack([nodes[:-1], nodes[1:]], axis=1)[step]
     count = np.bincount(chains[:-1][step], minlength=len(lines))
     return points, _Lines(np.concatenate([[0], np.cumsum(count)]), pieces)
+
+
+def _meeting(points: Array, ends: IntArray, name: IntArray) -> tuple[Array, IntArray]:
+    """The points in which pairs of segments meet, and which of them each pair meets in.
+
+    Three sheets are seen to meet in up to three triangles; these have one `name` (k, 3) and get one point. Sheets that
+    share a plane or a side may meet in several points: what does not lie on the segments of a pair is not its point.
+    `ends` (k, 4) are the ends of both segments.
+    """
+    a, b, c, d = np.moveaxis(points[ends], 1, 0)
+    # nearest points of two segments that cross up to round-off
+    normal = np.cross(b - a, d - c)
+    square = np.maximum(np.einsum("ij,ij->i", normal, normal), np.finfo(np.float64).tiny)
+    share = np.clip(np.einsum("ij,ij->i", np.cross(c - a, d - c), normal) / square, 0.0, 1.0)
+    place = a + share[:, None] * (b - a)
+    near = ROUNDING * float(np.abs(points[ends]).max(initial=0.0))
+    group = np.unique(name, axis=0, return_inverse=True)[1].reshape(-1)
+    which = np.full(len(name), -1)
+    todo, made = np.arange(len(name)), 0
+    chosen: list[IntArray] = []
+    while len(todo):
+        names, first, at = np.unique(group[todo], return_index=True, return_inverse=True)
+        lead = todo[first][at.reshape(-1)]
+        fits = (_away(place[lead], a[todo], b[todo]) <= near) & (_away(place[lead], c[todo], d[todo]) <= near)
+        fits |= lead == todo
+        which[todo[fits]] = made + at.reshape(-1)[fits]
+        chosen.append(todo[first])
+        made += len(names)
+        todo = todo[~fits]
+    return place[np.concatenate(chosen)] if chosen else place, which
+
+
+def _away(points: Array, start: Array, stop: Array) -> Array:
+    """(k,) distance of each point from its segment."""
+    along = stop - start
+    square = np.maximum(np.einsum("ij,ij->i", along, along), np.finfo(np.float64).tiny)
+    share = np.clip(np.einsum("ij,ij->i", points - start, along) / square, 0.0, 1.0)
+    return np.asarray(np.linalg.norm(points - start - share[:, None] * along, axis=1))
 
 
 def _rims(

@@ -19,11 +19,15 @@ from patchwright.models.errors import GeometryError, ParameterError
 from patchwright.models.tree import Tree
 from patchwright.models.triangulation import Triangulation, concatenate
 from patchwright.models.winding import winding_number
-from patchwright.ssi.cut_triangles import CutTriangles, cut_triangles
+from patchwright.ssi.cut_triangles import CutTriangles, cut_triangles, merged
+from patchwright.ssi.flat_triangles import without_flat
 from patchwright.ssi.mesh_mesh import mesh_intersection
 from patchwright.ssi.mesh_topology import MeshIntersection
 
-NEAREST = 10  # tenths of the piece's size: how near to it, at last, the winding number is asked
+NEARER = (1, 2, 4, 6, 8, 9)  # tenth powers of the piece's size: how near to it the winding number is asked, in turn
+THIN = 1e-13  # of the coordinates: a piece no higher is a line
+COINCIDENT = 6  # from here on what is the same on both sides is taken to be so
+RAYS = ((0.9347, 0.2113, 0.2857), (-0.3371, 0.7823, -0.5239))  # in no direction that models favour
 
 
 def outer_hull(meshes: Sequence[Triangulation]) -> Triangulation:
@@ -57,9 +61,13 @@ def outer_pieces(whole: Triangulation) -> tuple[Triangulation, IntArray]:
     found = mesh_intersection(whole)
     cut = cut_triangles(whole, found)
     patch = regions(cut)
-    front, back = _sides(whole, cut, patch)
-    keep = ((front <= 0) & (back >= 1))[patch]
-    keep &= ~_repeated(whole, found, cut)
+    largest = _largest(cut, patch)
+    thin = _heights(cut, largest) <= THIN * float(np.abs(whole.bounds).max())
+    front, back = _sides(whole, cut, largest[~thin])
+    kept = np.zeros(len(largest), dtype=np.bool_)
+    kept[~thin] = (front <= 0) & (back >= 1) & ~_repeated(whole, found, cut, largest[~thin])
+    kept |= _closing(cut, patch, kept, thin)
+    keep = kept[patch]
     hull = Triangulation(
         cut.vertices,
         cut.triangles[keep],
@@ -85,7 +93,11 @@ def unbalanced_edges(triangles: IntArray, vertices: int) -> int:
 
 
 def _welded(mesh: Triangulation) -> tuple[Triangulation, IntArray]:
-    """Equal coordinates as one vertex, without triangles that have one vertex twice; and which triangles are left."""
+    """What round-off cannot tell apart as one vertex, triangles without area taken out; and what each was a piece of.
+
+    Equal coordinates become the lowest vertex that has them. Vertices within `ROUNDING` of each other would give
+    pieces that no arithmetic on rounded coordinates can order, and become one too.
+    """
     order = np.lexsort(mesh.vertices.T[::-1])
     rows = mesh.vertices[order]
     fresh = np.ones(len(rows), dtype=np.bool_)
@@ -93,10 +105,11 @@ def _welded(mesh: Triangulation) -> tuple[Triangulation, IntArray]:
     start = np.maximum.accumulate(np.where(fresh, np.arange(len(rows)), 0))
     number = np.empty(len(rows), dtype=np.int64)
     number[order] = order[start]  # the sort is stable: the lowest number of those with equal coordinates
-    triangles = number[mesh.triangles]
-    good = (triangles != np.roll(triangles, 1, axis=1)).all(axis=1)
-    tags = None if mesh.tags is None else mesh.tags[good]
-    return Triangulation(mesh.vertices, triangles[good], tags=tags, tag_names=mesh.tag_names), np.flatnonzero(good)
+    used = np.unique(number[mesh.triangles])
+    number = merged(mesh.vertices, used, 0)[number]
+    triangles, parent = without_flat(mesh.vertices, number[mesh.triangles])
+    tags = None if mesh.tags is None else mesh.tags[parent]
+    return Triangulation(mesh.vertices, triangles, tags=tags, tag_names=mesh.tag_names), parent
 
 
 def regions(cut: CutTriangles) -> IntArray:
@@ -120,33 +133,76 @@ def regions(cut: CutTriangles) -> IntArray:
     return label.astype(np.int64)
 
 
-def _sides(whole: Triangulation, cut: CutTriangles, patch: IntArray) -> tuple[IntArray, IntArray]:
-    """Winding numbers in front of and behind each region, asked at its largest piece, ever nearer until both are whole.
-
-    They are taken when they differ by a whole number other than zero and, at a tenth of the distance, are the same.
-    """
+def _largest(cut: CutTriangles, patch: IntArray) -> IntArray:
+    """(r,) the largest piece of each region: what is true of it is true of all, and it can be told there best."""
     corners = cut.vertices[cut.triangles]
-    vectors = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    area = np.linalg.norm(vectors, axis=1)
+    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
     order = np.lexsort((-np.arange(len(area)), area, patch))
-    deep = order[np.append(np.flatnonzero(np.diff(patch[order])), len(order) - 1)]
+    return np.asarray(order[np.append(np.flatnonzero(np.diff(patch[order])), len(order) - 1)])
+
+
+def _heights(cut: CutTriangles, some: IntArray) -> Array:
+    """(k,) the least height of some pieces."""
+    corners = cut.vertices[cut.triangles[some]]
+    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
+    return np.asarray(area / np.maximum(longest, np.finfo(np.float64).tiny))
+
+
+def _closing(cut: CutTriangles, patch: IntArray, kept: BoolArray, thin: BoolArray) -> BoolArray:
+    """(r,) which of the `thin` regions close edges that the `kept` ones leave open.
+
+    Three points in one line but for rounding make a piece without an inside or an outside to ask for; its border tells.
+    """
+    chosen = np.zeros(len(thin), dtype=np.bool_)
+    if not thin.any():
+        return chosen
+    count = len(cut.vertices)
+    tail, head = cut.triangles, np.roll(cut.triangles, -1, axis=1)
+    keys, way = np.minimum(tail, head) * count + np.maximum(tail, head), np.sign(head - tail)
+    some = thin[patch]
+    edges, at = np.unique(keys[some], return_inverse=True)
+    place = np.minimum(np.searchsorted(edges, keys[kept[patch]]), len(edges) - 1)
+    mine = edges[place] == keys[kept[patch]]
+    open_ = np.bincount(place[mine], way[kept[patch]][mine], minlength=len(edges))
+    entries, entry = np.unique(np.repeat(patch[some], 3) * len(edges) + at.reshape(-1), return_inverse=True)
+    region, edge = entries // len(edges), entries % len(edges)
+    net = np.bincount(entry.reshape(-1), way[some].reshape(-1))
+    while True:
+        change = np.bincount(region, np.abs(open_[edge] + net) - np.abs(open_[edge]), minlength=len(thin))
+        better = (change < 0) & thin & ~chosen
+        if not better.any():
+            return chosen
+        # of those at one edge the first, as the others may not be wanted any more
+        asked = better[region]
+        first = np.full(len(edges), len(thin))
+        np.minimum.at(first, edge[asked], region[asked])
+        better[region[asked & (first[edge] != region)]] = False
+        chosen |= better
+        taken = better[region]
+        open_ += np.bincount(edge[taken], net[taken], minlength=len(edges))
+
+
+def _sides(whole: Triangulation, cut: CutTriangles, deep: IntArray) -> tuple[IntArray, IntArray]:
+    """Winding numbers in front of and behind some pieces, asked ever nearer until both are whole.
+
+    They are taken when they differ and are the same nearer to the piece.
+    """
     normal = whole.normals[cut.parents[deep]]
-    middle = corners[deep].mean(axis=1)
-    longest = np.linalg.norm(corners[deep] - np.roll(corners[deep], 1, axis=1), axis=2).max(axis=1)
-    inner = area[deep] / np.maximum(longest, np.finfo(np.float64).tiny)  # the least height of the piece
+    middle = cut.vertices[cut.triangles[deep]].mean(axis=1)
+    inner = _heights(cut, deep)
+    if not len(deep):
+        return deep, deep
     tree = Tree.of(whole)
     result = np.zeros((2, len(deep)), dtype=np.int64)
     previous = np.full((2, len(deep)), np.nan)
     todo = np.arange(len(deep))
-    for tenth in range(1, NEAREST):
+    for tenth in NEARER:
         step = (inner[todo] * 10.0**-tenth)[:, None] * normal[todo]
-        around = np.stack([winding_number(whole, middle[todo] + s * step, tree=tree) for s in (1.0, -1.0)])
-        near = np.round(around)
-        settled = (
-            (near == previous[:, todo]).all(axis=0) & (near[0] != near[1]) & (np.abs(around - near) < 0.1).all(axis=0)
-        )
+        near = np.stack([_winding(whole, tree, middle[todo] + s * step) for s in (1.0, -1.0)])
+        settled = (near == previous[:, todo]).all(axis=0)
         # between two sheets that coincide and face each other nothing changes: they go either way
-        settled |= (near == previous[:, todo]).all(axis=0) & (near[0] == near[1]) & (tenth >= NEAREST // 2)
+        settled &= (near[0] != near[1]) | (tenth >= COINCIDENT)
         previous[:, todo] = near
         result[:, todo[settled]] = near[:, settled].astype(np.int64)
         todo = todo[~settled]
@@ -158,22 +214,46 @@ def _sides(whole: Triangulation, cut: CutTriangles, patch: IntArray) -> tuple[In
     )
 
 
-def _repeated(whole: Triangulation, found: MeshIntersection, cut: CutTriangles) -> BoolArray:
-    """(m,) pieces that coincide with one of an earlier triangle with the same orientation."""
-    again = np.zeros(len(cut.triangles), dtype=np.bool_)
+def _winding(whole: Triangulation, tree: Tree, points: Array) -> Array:
+    """(k,) winding numbers of a closed mesh, NaN where none is near a whole number.
+
+    Counted along rays: what leaves the mesh less what enters it. Where two rays do not agree (one ran through an edge)
+    the solid angles are summed.
+    """
+    length = 2.0 * whole.diagonal
+    counts = []
+    for ray in RAYS:
+        direction = np.array(ray) / np.linalg.norm(ray)
+        hits = tree.all_hits(points, points + length * direction)
+        way = np.sign(whole.normals[hits.triangle] @ direction)
+        counts.append(np.bincount(hits.segment, way, minlength=len(points)))
+    result = counts[0].astype(np.float64)
+    unsure = np.flatnonzero(counts[0] != counts[1])
+    if len(unsure):
+        around = winding_number(whole, points[unsure], tree=tree)
+        whole_number = np.round(around)
+        result[unsure] = np.where(np.abs(around - whole_number) < 0.1, whole_number, np.nan)
+    return result
+
+
+def _repeated(whole: Triangulation, found: MeshIntersection, cut: CutTriangles, deep: IntArray) -> BoolArray:
+    """(r,) which of some pieces coincide with one of an earlier triangle with the same orientation."""
+    again = np.zeros(len(deep), dtype=np.bool_)
     if not len(found.coplanar):
         return again
     low, high = found.coplanar.min(axis=1), found.coplanar.max(axis=1)
     same = np.einsum("ij,ij->i", whole.normals[low], whole.normals[high]) > 0.0
     low, high = low[same], high[same]
     # every piece of the later triangle against the earlier triangle
-    start, stop = np.searchsorted(cut.parents, high), np.searchsorted(cut.parents, high, side="right")
+    order = np.argsort(cut.parents[deep], kind="stable")
+    parents = cut.parents[deep][order]
+    start, stop = np.searchsorted(parents, high), np.searchsorted(parents, high, side="right")
     count = stop - start
-    piece = np.repeat(start - (np.cumsum(count) - count), count) + np.arange(int(count.sum()))
+    row = order[np.repeat(start - (np.cumsum(count) - count), count) + np.arange(int(count.sum()))]
     earlier = np.repeat(low, count)
-    middle = cut.vertices[cut.triangles[piece]].mean(axis=1)
+    middle = cut.vertices[cut.triangles[deep[row]]].mean(axis=1)
     inside = _inside(whole.corners[earlier], middle)
-    again[piece[inside]] = True
+    again[row[inside]] = True
     return again
 
 
