@@ -1,6 +1,6 @@
 """The dirty half model in high-lift configuration over ten seeds, one row each, beside an alpha wrap of the same input.
 
-    python benchmarks/table_high_lift.py [--seeds N] [--wrap]
+    python benchmarks/table_high_lift.py [--seeds N] [--first N] [--wrap]
 
 `slot` is the share of points half-way across the slot that are outside the result (100 %: it stayed open), `surface`
 the largest distance of the result's points to the undamaged triangles (a bridge from the upper to the lower skin would
@@ -98,9 +98,10 @@ def wrap(seed: int, cell: float) -> str:
 def main() -> None:
     arguments = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     arguments.add_argument("--seeds", type=int, default=10)
+    arguments.add_argument("--first", type=int, default=0, help="the first seed")
     arguments.add_argument("--wrap", action="store_true")
     asked = arguments.parse_args()
-    for seed in range(asked.seeds):
+    for seed in range(asked.first, asked.first + asked.seeds):
         print(f"{seed:3d} patchwright  {ours(seed)}", flush=True)
         if asked.wrap:
             for cell in (0.02, 0.005):

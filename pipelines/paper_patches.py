@@ -24,6 +24,7 @@ from patchwright.models.samples import car, damage, demo_aircraft, missing_trian
 from patchwright.models.samples.body import Body
 from patchwright.models.samples.sample import Sample
 from patchwright.models.samples.splines import cubic
+from patchwright.models.tolerance import Tolerance
 from patchwright.pipelines.approximate import APART, side_by_side
 from patchwright.pipelines.outputs import prepare_folder
 from patchwright.pipelines.pictures import free_edges, output_surface
@@ -174,9 +175,12 @@ def body_cases(report: Any) -> tuple[BodyResult, ...]:
 
 
 def draw_body(result: BodyResult, path: Path) -> Scene:
-    """The dirty body with its free edges on the left, the patches on the right."""
+    """The dirty body with its free edges above, the patches below."""
+    from patchwright.repair.weld import weld, weld_distance
+
     body, colours, borders = output_surface(result.repaired)
-    before = result.model.triangulation
+    raw = result.model.triangulation
+    before = weld(raw, weld_distance(raw, Tolerance.of(result.model))[0]).triangulation  # a soup would be red all over
     box = before.bounds
     right = np.cross([0.0, 0.0, 1.0], DIRECTION)
     right /= np.linalg.norm(right)
@@ -186,7 +190,7 @@ def draw_body(result: BodyResult, path: Path) -> Scene:
     shift = -up * APART * float(np.ptp(corners @ up))
     both = np.stack([np.minimum(box[0], box[0] + shift), np.maximum(box[1], box[1] + shift)])
     scene = Scene(path, f"{result.title}: as it came (top), resurfaced (bottom)", both)
-    scene.surface(before).lines(free_edges(before)[:200_000], colour="#c03030", width=1.0)
+    scene.surface(before).lines(free_edges(before), colour="#c03030", width=1.0)
     moved = type(body)(body.vertices + shift, body.triangles)
     return scene.surface(moved, colours=colours).lines(borders + shift, colour="#33475a", width=1.0)
 
