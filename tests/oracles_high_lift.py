@@ -50,19 +50,24 @@ def to_segments(points: np.ndarray, segments: np.ndarray) -> np.ndarray:
 def located(dirty: DirtySample) -> float:
     """Share of the injected defects that diagnosis names near their place, no farther off than their own size.
 
-    A triangle missing beside a slit is part of the slit's rim: a gap also counts in the box of one that is found.
+    A triangle missing beside a slit is part of the slit's rim: a gap also counts where it lies within its own size of
+    a larger injected one that is itself named near its place.
     """
     found = diagnose(dirty.assembly, domain=DOMAIN)
-    hits = 0
-    for label in dirty.defects:
-        reach = np.linalg.norm(label.box[1] - label.box[0]) + label.size
+    labels = dirty.defects
+    reach = np.array([np.linalg.norm(label.box[1] - label.box[0]) + label.size for label in labels])
+    named = np.zeros(len(labels), dtype=bool)
+    for k, label in enumerate(labels):
         same = [d for d in found.defects if d.kind == label.kind]
-        near = any(np.linalg.norm(d.where - label.where) <= reach and d.size <= 4.0 * reach for d in same)
-        within = label.kind == "gap" and any(
-            ((label.where >= d.box[0] - reach) & (label.where <= d.box[1] + reach)).all() for d in same
-        )
-        hits += near or within
-    return hits / len(dirty.defects)
+        named[k] = any(np.linalg.norm(d.where - label.where) <= reach[k] and d.size <= 4.0 * reach[k] for d in same)
+    gaps = np.array([label.kind == "gap" for label in labels])
+    boxes = np.array([label.box for label in labels])
+    joined = np.zeros(len(labels), dtype=bool)
+    for k in np.flatnonzero(gaps & ~named):
+        where = labels[k].where
+        inside = ((where >= boxes[:, 0] - reach[k]) & (where <= boxes[:, 1] + reach[k])).all(axis=1)
+        joined[k] = (inside & gaps & named & (reach > reach[k])).any()
+    return float((named | joined).mean())
 
 
 def false_changes(dirty: DirtySample, ledger: tuple[LedgerEntry, ...]) -> int:
