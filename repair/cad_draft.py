@@ -35,10 +35,10 @@ class Limits:
     until: float
 
     @classmethod
-    def of(cls, diagonal: float) -> Limits:
-        """The shares above of a diagonal."""
+    def of(cls, diagonal: float, seconds: float = SECONDS) -> Limits:
+        """The shares above of a diagonal; nothing new is begun after `seconds`."""
         on, fit, reach, loose = (share * diagonal for share in (ON_SHARE, FIT_SHARE, REACH_SHARE, LOOSE_SHARE))
-        return cls(diagonal, on, fit, reach, loose, time.monotonic() + SECONDS)
+        return cls(diagonal, on, fit, reach, loose, time.monotonic() + seconds)
 
     @property
     def expired(self) -> bool:
@@ -60,6 +60,16 @@ class Change:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Attempt:
+    """What was tried on which parts, why it came to nothing, and where."""
+
+    what: str
+    faces: tuple[int, ...]
+    reason: str
+    where: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Draft:
     """An assembly with a topology that is being mended; its parts stay in order."""
 
@@ -76,6 +86,13 @@ class Draft:
         surface = self.parts[face].surface
         assert surface is not None
         return surface
+
+    def middle(self, face: int) -> Array:
+        """(3,) a point in the middle of a face's edges, or of its triangles where it has none."""
+        curves = [self.topology.curves[use.edge] for loop in self.topology.loops[face] for use in loop]
+        if not curves:
+            return np.asarray(self.parts[face].triangulation.bounds.mean(axis=0))
+        return np.asarray(np.mean([curve(np.linspace(*curve.domain, 5)) for curve in curves], axis=(0, 1)))
 
     def rims(self) -> tuple[FreeLoop, ...]:
         """Rings and chains of free edges."""

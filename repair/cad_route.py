@@ -17,18 +17,22 @@ from patchwright.models.cad.seams import measure_seams
 from patchwright.models.cad.sewing import SewnResult, free_edge_curve, sew
 from patchwright.models.tolerance import Tolerance
 from patchwright.models.triangulation import Triangulation
-from patchwright.repair.cad_draft import Change
+from patchwright.repair.cad_draft import LOOSE_SHARE, Attempt, Change, Draft, Limits
 from patchwright.repair.cad_grid import cad_grid
 from patchwright.repair.cad_heal import Healed, heal
 from patchwright.repair.decisions import CAPPED, Candidate, Decisions
 from patchwright.repair.deviation import two_sided
 from patchwright.repair.diagnosing import diagnose
 from patchwright.repair.diagnosis import Defect, Diagnosis
+from patchwright.repair.face_steps import widest
 from patchwright.repair.mended import LEFT_OUT
 from patchwright.repair.result import Face, LedgerEntry, Point, Problem, Progress, Repaired, Rung, Seam, Verdict
+from patchwright.repair.retrace import retrace
 from patchwright.repair.weld import weld
 
 SHARES = np.array([1e-8, 1e-7, 1e-6, 1e-5, 1e-4])  # of the diagonal: sewing tolerances tried, smallest first
+POINT = 1e-9  # of the diagonal: an edge this short is a pole
+COINCIDENT = 1e-6  # of the diagonal: edges this near to each other are one edge that the file holds twice
 SEAM_SHARE = 1e-6  # of the diagonal: the widest seam between kept faces that is closed
 UNCHANGED = 1e-12  # of the diagonal: a kept surface's numbers may differ by round-off only
 LEFT = {"opening", "parametrisation", "component", "thin", "unit", "far-field", "seam-angle", "loose-tolerance"}
@@ -49,6 +53,11 @@ class _Outcome:
     around: tuple[tuple[int, ...], ...] = ()
     left: tuple[tuple[Candidate, str], ...] = ()
 
+    @property
+    def changes(self) -> tuple[Change, ...]:
+        """What healing changed."""
+        return self.healed.changes if self.healed is not None else ()
+
 
 def repair_cad(
     model: Assembly,
@@ -68,11 +77,9 @@ def repair_cad(
     progress("sewing", 0.2)
     outcome = _sewn(model)
     progress("healing open seams", 0.3)
-    healed = heal(outcome.assembly, model.diagonal)
-    if healed is not None:
-        outcome = replace(outcome, assembly=healed.assembly, healed=healed)
+    outcome = _healed(model, outcome)
     after = diagnosis
-    if outcome.sewn is not None or healed is not None:
+    if outcome.sewn is not None or outcome.changes:
         progress("checking the mended shell", 0.6)
         domain = decisions.surroundings.domain if decisions is not None else None
         after = diagnose(outcome.assembly, tolerance=tolerance, domain=domain)
@@ -100,7 +107,7 @@ def repair_cad(
     areas = np.array([part.triangulation.areas.sum() for part in outcome.assembly.parts])
     on_cap = None if body.tags is None else caps[body.tags]
     deviation = two_sided(model.triangulation, body, tolerance.fit, skip_after=on_cap)
-    verdict = Verdict.CLEAN if outcome.sewn is None and outcome.healed is None else Verdict.REPAIRED
+    verdict = Verdict.CLEAN if outcome.sewn is None and not outcome.changes else Verdict.REPAIRED
     if outcome.caps:
         verdict = Verdict.INVENTED
     faces = _faces(outcome, areas)
@@ -122,12 +129,32 @@ def repair_cad(
     )
 
 
+def _healed(model: Assembly, sewn: _Outcome) -> _Outcome:
+    """The sewn model healed, or the model as it came where healing alone closes as much with narrower seams.
+
+    Sewing takes edges within its tolerance for one; healing finds the curve where their surfaces meet. So where sewing
+    left free edges or needed more than round-off, both are tried.
+    """
+    limits = Limits.of(model.diagonal)
+    found = []
+    if sewn.sewn is not None and (_free_edges(sewn.assembly) or sewn.sewn.tolerance > COINCIDENT * model.diagonal):
+        alone = heal(model, limits)
+        if alone is not None and alone.changes:
+            found.append(_Outcome(alone.assembly, None, sewn.reason, alone))
+    if not found or _free_edges(found[0].assembly):
+        healed = heal(sewn.assembly, limits)
+        found.append(sewn if healed is None else replace(sewn, assembly=healed.assembly, healed=healed))
+    else:
+        found.append(sewn)
+    return min(found, key=lambda one: (_free_edges(one.assembly), widest(one.assembly)))
+
+
 def _free_edges(assembly: Assembly) -> int:
     topology = assembly.topology
     if topology is None:
         return len(assembly.parts)
     lengths = np.array([np.ptp(c(np.linspace(*c.domain, 5)), axis=0).max() for c in topology.curves])
-    return int(((topology.use_counts() == 1) & (lengths > 0.0)).sum())
+    return int(((topology.use_counts() == 1) & (lengths > POINT * assembly.diagonal)).sum())
 
 
 def _sewn(model: Assembly) -> _Outcome:
@@ -142,12 +169,28 @@ def _sewn(model: Assembly) -> _Outcome:
         result = sew(model, float(curve.tolerances[k]))
         if result.dropped or result.surface_change.max(initial=0.0) > UNCHANGED * max(model.diagonal, 1.0):
             continue
-        gaps = [s.gap for s in measure_seams(result.assembly)]
-        if max(gaps, default=0.0) <= SEAM_SHARE * model.diagonal:
-            reason = f"{free} free edges become {result.free_edges}; free edges by tolerance: {counts}"
+        gap = _widest_to_be(result.assembly, model.diagonal)
+        reason = f"{free} free edges become {result.free_edges}; free edges by tolerance: {counts}"
+        if gap <= SEAM_SHARE * model.diagonal:
+            return _Outcome(result.assembly, result, reason)
+        if curve.tolerances[k] <= COINCIDENT * model.diagonal and gap <= LOOSE_SHARE * model.diagonal:
+            reason += (
+                f"; the edges coincide, and surfaces up to {gap:.2g} apart beside them are the file's own precision"
+            )
             return _Outcome(result.assembly, result, reason)
     return _Outcome(
         model, None, f"no tolerance up to {curve.tolerances[-1]:.3g} closes a seam whose surfaces meet; {counts}"
+    )
+
+
+def _widest_to_be(sewn: Assembly, diagonal: float) -> float:
+    """The widest seam once trims that stray from their edges are drawn anew, which is what comes next."""
+    widest = max((s.gap for s in measure_seams(sewn)), default=0.0)
+    if sewn.topology is None or widest <= SEAM_SHARE * diagonal:
+        return widest
+    drawn, _ = retrace(Draft(sewn, sewn.topology), Limits.of(diagonal))
+    return max(
+        (s.gap for s in measure_seams(replace(drawn.assembly, topology=drawn.topology, native=None))), default=0.0
     )
 
 
@@ -184,7 +227,7 @@ def _faces(outcome: _Outcome, areas: Array) -> tuple[Face, ...]:
     names = outcome.assembly.names
     around = dict(zip(outcome.caps, outcome.around, strict=True))
     changed: dict[int, Change] = {}
-    for change in outcome.healed.changes if outcome.healed else ():
+    for change in outcome.changes:
         for face in change.faces:
             if face not in changed or change.largest_move > changed[face].largest_move:
                 changed[face] = change
@@ -206,13 +249,14 @@ def _problem(defect: Defect) -> Problem:
 
 
 def _ledger(model: Assembly, outcome: _Outcome, before: Diagnosis, after: Diagnosis) -> tuple[LedgerEntry, ...]:
-    changes = outcome.healed.changes if outcome.healed else ()
+    changes = outcome.changes
     touched = {face for change in changes for face in change.faces}
     kept = [p for i, p in enumerate(model.parts) if i not in touched]
     area = float(sum(p.triangulation.areas.sum() for p in kept))
     entries = [
         LedgerEntry("CAD faces kept", Rung.KEEP, (), "their surfaces are identical", count=len(kept), area=area),
         *(_entry(model, change) for change in changes),
+        *(_in_vain(model, attempt) for attempt in (outcome.healed.failed if outcome.healed else ())),
     ]
     if outcome.healed and outcome.healed.opened:
         why = "their surfaces were farther apart than a closed seam; each face was given its own border"
@@ -278,6 +322,12 @@ def _entry(model: Assembly, change: Change) -> LedgerEntry:
         largest_move=change.largest_move,
         where=_point(change.where),
     )
+
+
+def _in_vain(model: Assembly, attempt: Attempt) -> LedgerEntry:
+    names = tuple(model.parts[face].name for face in attempt.faces)
+    what = f"{attempt.what}: tried in vain"
+    return LedgerEntry(what, Rung.KEEP, names, attempt.reason, count=len(names), where=_point(attempt.where))
 
 
 def _point(where: Array | Point) -> Point:

@@ -85,7 +85,7 @@ def _edges(topology: Topology, tolerances: Array) -> list[Any]:
     for number, curve in enumerate(topology.curves):
         for vertex, at in zip(topology.ends[number], (0, -1), strict=True):
             off = float(np.linalg.norm(curve.control_points[at] - topology.vertices[vertex]))
-            reach[vertex] = max(reach[vertex], off, tolerances[number])
+            reach[vertex] = max(reach[vertex], off + tolerances[number])  # a pcurve's end may be as far again
     vertices = []
     for point, tolerance in zip(topology.vertices.tolist(), reach.tolist(), strict=True):
         vertex = kernel.TopoDS_Vertex()

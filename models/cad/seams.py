@@ -13,7 +13,9 @@ from patchwright.models.errors import ParameterError
 from patchwright.models.nurbs_curve import NurbsCurve
 from patchwright.models.topology import Topology
 
-_PROBES = 9  # samples per edge where only its deviation is asked
+_PROBES = 33  # samples per edge where only its deviation is asked
+_RESOLUTION = 1e-7  # of the kernel (Precision::Confusion): no tolerance is smaller
+_BETWEEN = 0.05  # of a deviation: what may lie between two samples
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,7 +24,8 @@ class Seam:
 
     `gap` is the largest distance between the two surfaces at equal parameters of the edge; `across` is its part across
     the edge, which leaves out pcurves that only run at different speeds (to first order in the slip); `angle` the
-    largest angle in degrees between their outward normals (0 smooth, 180 a fold), `length` that of the edge,
+    largest angle in degrees between their outward normals (0 smooth, 180 a fold), `typical` its median along the edge,
+    which a singular corner of a surface does not spoil, `length` that of the edge,
     `tolerance` the kernel's own (NaN when the edge never saw the kernel), `at` the point half-way. `beyond` is how far,
     in shares of the surface's parameter range, a pcurve leaves it; the surface is then taken at its border.
     """
@@ -36,6 +39,7 @@ class Seam:
     tolerance: float
     at: tuple[float, float, float]
     beyond: float
+    typical: float = 0.0
 
 
 def measure_seams(assembly: Assembly, samples: int = 24) -> list[Seam]:
@@ -70,7 +74,7 @@ def measure_seams(assembly: Assembly, samples: int = 24) -> list[Seam]:
     cosines = np.clip(np.einsum("esk,esk->es", normals[first], normals[second]), -1.0, 1.0)
     cross = np.linalg.norm(np.cross(normals[first], normals[second]), axis=2)
     defined = (np.abs(normals[first]).sum(axis=2) > 0.0) & (np.abs(normals[second]).sum(axis=2) > 0.0)
-    angles = np.where(defined, np.degrees(np.arctan2(cross, cosines)), 0.0).max(axis=1)
+    angles = np.where(defined, np.degrees(np.arctan2(cross, cosines)), 0.0)
     chords = np.linalg.norm(np.diff(points[first], axis=1), axis=2).sum(axis=1)
     native = getattr(assembly.native, "edge_tolerances", None)
     known = native if native is not None and len(native) == len(topology.curves) else None
@@ -86,27 +90,41 @@ def measure_seams(assembly: Assembly, samples: int = 24) -> list[Seam]:
                 (int(shared[a, 1]), int(shared[b, 1])),
                 float(gaps[k]),
                 float(across[k]),
-                float(angles[k]),
+                float(angles[k].max()),
                 float(chords[k]),
                 nan if known is None else float(known[edge]),
                 (float(middle[0]), float(middle[1]), float(middle[2])),
                 float(max(beyond[a], beyond[b])),
+                float(np.median(angles[k])),
             )
         )
     return out
 
 
 def edge_deviation(assembly: Assembly, samples: int = _PROBES) -> Array:
-    """(e,) largest distance of each edge's 3-D curve from its pcurves on their surfaces; empty without topology."""
+    """(e,) largest distance of each edge's 3-D curve from its pcurves on their surfaces; empty without topology.
+
+    Edges that deviate by more than the kernel's resolution are sampled again five times as densely, and get a
+    twentieth more for what lies between the samples: a tolerance that is too small makes a face invalid.
+    """
     topology = assembly.topology
     if topology is None or not topology.curves:
         return np.zeros(0)
     uses = edge_uses(topology)
+    off = _deviation(assembly, topology, uses, samples)
+    again = uses[off[uses[:, 0]] > _RESOLUTION]
+    if len(again):
+        off = np.maximum(off, (1.0 + _BETWEEN) * _deviation(assembly, topology, again, 5 * (samples - 1) + 1))
+    return off
+
+
+def _deviation(assembly: Assembly, topology: Topology, uses: IntArray, samples: int) -> Array:
+    """(e,) of `edge_deviation` at equally spaced samples of some uses, zero for the edges of no such use."""
     points, _, _ = _on_surfaces(assembly, topology, uses, samples, with_normals=False)
-    curves = np.stack([_sampled(curve, samples) for curve in topology.curves])
-    off = np.linalg.norm(points - curves[uses[:, 0]], axis=2).max(axis=1)
+    edges, place = np.unique(uses[:, 0], return_inverse=True)
+    curves = np.stack([_sampled(topology.curves[int(edge)], samples) for edge in edges])
     out = np.zeros(len(topology.curves))
-    np.maximum.at(out, uses[:, 0], off)
+    np.maximum.at(out, uses[:, 0], np.linalg.norm(points - curves[place.reshape(-1)], axis=2).max(axis=1))
     return out
 
 
