@@ -54,8 +54,18 @@ def _welded(study: Study) -> Triangulation:
     """The input with its round-off welded: in a soup every edge is free, and a picture of them all shows nothing."""
     from patchwright.repair.weld import weld, weld_distance
 
-    body = study.assembly.triangulation
+    body = _without_far_field(study)
     return weld(body, weld_distance(body, study.tolerance)[0]).triangulation
+
+
+def _without_far_field(study: Study) -> Triangulation:
+    """The input without the parts that bound the domain, beside which the model would be a dot."""
+    body = study.assembly.triangulation
+    far = [name for d in (study.before.defects if study.before else ()) if d.kind == "far-field" for name in d.parts]
+    if not far or body.tags is None:
+        return body
+    keep = ~np.isin(np.array(body.tag_names)[body.tags], far)
+    return body.take(keep).compact() if keep.any() else body
 
 
 def _spots(study: Study) -> list[Scene]:

@@ -135,7 +135,7 @@ def surroundings(model: Assembly, domain: Domain | None = None) -> Surroundings:
             bodies = "1 body bounds" if count == 1 else f"{count} bodies bound"
             reasons.append(f"{bodies} the fluid from outside: the fluid point lies inside")
     if domain.far_field is None:
-        pieces = faces_of(mesh) if model.is_cad else pieces_of(mesh, 0.0)
+        pieces = faces_of(mesh) if model.is_cad else _by_part(mesh, pieces_of(mesh, 0.0))
         outer, reason = far_pieces(pieces.low, pieces.high)
         if len(outer):
             guessed = np.isin(pieces.label, outer)
@@ -168,6 +168,12 @@ def pieces_of(mesh: Triangulation, distance: float) -> Pieces:
 def faces_of(mesh: Triangulation) -> Pieces:
     """The parts of a tagged triangulation that have triangles."""
     return _boxed(mesh, np.unique(_tagged(mesh), return_inverse=True)[1].reshape(-1).astype(np.int64))
+
+
+def _by_part(mesh: Triangulation, pieces: Pieces) -> Pieces:
+    """The pieces split where parts meet: a half model may be connected with its symmetry plane and far field."""
+    pairs = np.stack([pieces.label, _tagged(mesh)], axis=1)
+    return _boxed(mesh, np.unique(pairs, axis=0, return_inverse=True)[1].reshape(-1).astype(np.int64))
 
 
 def _boxed(mesh: Triangulation, label: IntArray) -> Pieces:

@@ -57,6 +57,15 @@ def test_the_repaired_model_holds_the_far_field_triangle_for_triangle() -> None:
     assert any(e.parts == ("room",) and e.rung == "keep" for e in result.ledger)
 
 
+def test_a_half_model_connected_with_its_symmetry_plane_is_no_far_field() -> None:
+    from patchwright.models.samples.high_lift import dirty_high_lift
+
+    model = dirty_high_lift(0).assembly
+    around = surroundings(model)
+    assert around.far_field == ("farfield", "symmetry")
+    assert around.body(model).names == ("fuselage", "main", "flap")
+
+
 def test_named_far_field_of_any_size_is_no_part_of_the_body() -> None:
     model = assembly(body=BALL, room=placed(box(), 3.0, (-1.5, -1.5, -1.5)))
     assert surroundings(model).far_field == (), "too near to be guessed"
