@@ -29,15 +29,17 @@ def one_sided(topology: Topology) -> Topology:
         if start in turned:
             continue
         turned[start] = False
-        piece, sound = [start], True
+        piece = [start]
+        sound = True
         for face in piece:
             for other, against in beside[face]:
                 wanted = turned[face] != against
                 if other not in turned:
                     turned[other] = wanted
                     piece.append(other)
-                sound &= turned[other] == wanted
-        most = sum(turned[face] for face in piece) * 2 > len(piece)
-        for face in piece if sound else ():
-            flipped[face] = flipped[face] != (turned[face] != most)
+                sound = sound and turned[other] == wanted
+        most = 2 * sum(turned[face] for face in piece) > len(piece)
+        if sound:
+            for face in piece:
+                flipped[face] = flipped[face] != (turned[face] != most)
     return replace(topology, flipped=tuple(flipped))

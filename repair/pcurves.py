@@ -53,17 +53,15 @@ def below(surface: Surface, curve: NurbsCurve, accuracy: float, near: Array | No
         flat = (curve.control_points - surface.origin) @ np.stack([surface.xdir, surface.ydir], axis=1)
         found = NurbsCurve(curve.degree, curve.knots, flat, curve.weights)
         return _judged(surface, curve, found, divided(curve.breaks, 8))
-    straight = _straight(surface, curve, near, accuracy) or _affine(surface, curve)
-    if straight is not None:
-        return straight
+    exact = _straight(surface, curve, near, accuracy) or _affine(surface, curve)
+    if exact is not None:
+        return exact
     smooth, every = _smooth_pieces(curve), list(pairwise(curve.breaks.tolist()))
-    found = _refined(surface, curve, accuracy, near, smooth)
-    if (
-        found.residual > accuracy and len(smooth) < len(every) <= MOST // FIRST
-    ):  # its knots may be what stands in the way
+    best = _refined(surface, curve, accuracy, near, smooth)
+    if best.residual > accuracy and len(smooth) < len(every) <= MOST // FIRST:  # its knots may stand in the way
         other = _refined(surface, curve, accuracy, near, every)
-        found = other if other.residual < found.residual else found
-    return found
+        best = other if other.residual < best.residual else best
+    return best
 
 
 def _refined(
@@ -288,7 +286,7 @@ def knots_met(surface: Surface, pcurve: NurbsCurve) -> Array:
             out.append(0.5 * (low + high))
     found = np.unique(np.concatenate(out)) if out else np.zeros(0)
     clear = 1e-6 * (t[-1] - t[0])
-    return found[np.abs(found[:, None] - pcurve.breaks[None]).min(axis=1, initial=np.inf) > clear]
+    return np.asarray(found[np.abs(found[:, None] - pcurve.breaks[None]).min(axis=1, initial=np.inf) > clear])
 
 
 def _line(t: Array, values: Array) -> NurbsCurve | None:

@@ -9,6 +9,7 @@ import numpy as np
 from patchwright.models.arrays import Array, IntArray
 from patchwright.models.nurbs_curve import NurbsCurve
 from patchwright.models.topology import EdgeUse, Topology
+from patchwright.repair.checks.cad_rims_sorted import beside, cut_outs
 from patchwright.repair.checks.edges import SHARES, reading
 from patchwright.repair.checks.examination import Examination, box_of
 from patchwright.repair.checks.regions import plural
@@ -18,7 +19,9 @@ from patchwright.repair.diagnosis import Defect
 from patchwright.repair.rim_edges import RimEdges
 from patchwright.repair.rims import Rim, judge_loops
 
-CHORDS = 16  # per free edge
+CHORDS = 16  # per free edge, at least
+PER_SPAN, MOST_CHORDS = 8, 256  # chords per span of its curve, and at most
+TINY = 4.0  # of the round-off tolerance: a shorter edge lies near its neighbours by being short
 PROBES = 9  # per free edge where its distance from the others is asked
 
 
@@ -31,7 +34,7 @@ def cad_rims(exam: Examination) -> Finding:
     uses = _free_uses(exam, topology)
     free = np.array([use.edge for _, use in uses], dtype=np.int64)
     reach = free_edge_reach(topology, free)
-    sewn = reach <= exam.tolerance.gap
+    sewn = (reach <= exam.tolerance.gap) & (_sizes(topology, free) > TINY * exam.tolerance.gap)
     left = [use for use, near in zip(uses, sewn, strict=True) if not near]
     chains = _chains(exam, topology, left)
     limits = np.array(SHARES) * exam.diagonal
@@ -55,11 +58,20 @@ def cad_rims(exam: Examination) -> Finding:
         loops = [np.arange(edges.offsets[i], edges.offsets[i + 1]) for i in range(len(chains))]
         # a chain that touches sewn edges at both ends bounds a void all the same
         closed = np.ones(len(chains), dtype=np.bool_)
-        rims = judge_loops(edges, loops, closed, component, body, exam.tolerance.gap)
+        rims = beside(edges, judge_loops(edges, loops, closed, component, body, exam.tolerance.gap))
+        rims = cut_outs(rims, [_is_inner_loop(topology, chain) for chain in chains], component)
         defects += [_defect(exam, rims, chains, group, edges) for group in rim_groups(rims)]
     for kind, word in (("gap", "gaps"), ("hole", "holes"), ("opening", "openings")):
         figures[word] = sum(rim.kind == kind for rim in rims)
     return Finding(tuple(most_of_each(exam, defects)), figures)
+
+
+def _is_inner_loop(topology: Topology, chain: Chain) -> bool:
+    """Whether a chain of free edges is a whole loop of one face, and not its outer one."""
+    faces, edges = {face for face, _ in chain}, {use.edge for _, use in chain}
+    if len(faces) != 1:
+        return False
+    return any({use.edge for use in loop} == edges for loop in topology.loops[faces.pop()][1:])
 
 
 Use = tuple[int, EdgeUse]  # face and edge use
@@ -77,6 +89,12 @@ def _free_uses(exam: Examination, topology: Topology) -> list[Use]:
         for use in loop
         if counts[use.edge] == 1 and np.ptp(topology.curves[use.edge].control_points, axis=0).max() > least
     ]
+
+
+def _sizes(topology: Topology, edges: IntArray) -> Array:
+    """(k,) the diagonal of the box round each edge."""
+    boxes = [np.ptp(topology.curves[int(i)].control_points, axis=0) for i in edges]
+    return np.asarray(np.linalg.norm(np.array(boxes).reshape(-1, 3), axis=1))
 
 
 def _chains(exam: Examination, topology: Topology, uses: list[Use]) -> list[Chain]:
@@ -117,12 +135,15 @@ def _same_vertices(points: Array, distance: float) -> IntArray:
 
 def _rim_edges(exam: Examination, topology: Topology, chains: list[Chain]) -> RimEdges:
     """Chords along the free edges, with the surfaces' normals at their middles."""
-    share = np.linspace(0.0, 1.0, CHORDS + 1)
-    middle = 0.5 * (share[1:] + share[:-1])
-    starts, ends, normals, owner, sizes = [], [], [], [], []
+    starts, ends, normals, sizes = [], [], [], []
+    owner: list[IntArray] = []
     for chain in chains:
+        before = sum(len(some) for some in owner)
         for face, use in chain:
             curve, pcurve = topology.curves[use.edge], use.pcurve
+            count = int(np.clip(PER_SPAN * (len(curve.breaks) - 1), CHORDS, MOST_CHORDS))
+            share = np.linspace(0.0, 1.0, count + 1)
+            middle = 0.5 * (share[1:] + share[:-1])
             t0, t1 = curve.domain
             points = curve(t0 + share * (t1 - t0))
             u, v = pcurve(t0 + middle * (t1 - t0)).T
@@ -138,8 +159,8 @@ def _rim_edges(exam: Examination, topology: Topology, chains: list[Chain]) -> Ri
             starts.append(points[:-1])
             ends.append(points[1:])
             normals.append(normal)
-            owner.append(np.full(CHORDS, face))
-        sizes.append(CHORDS * len(chain))
+            owner.append(np.full(count, face))
+        sizes.append(sum(len(some) for some in owner) - before)
     start, end, normal = np.concatenate(starts), np.concatenate(ends), np.concatenate(normals)
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(float).tiny)
     outward = np.cross(end - start, normal)
