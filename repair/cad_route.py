@@ -188,7 +188,7 @@ def _widest_to_be(sewn: Assembly, diagonal: float) -> float:
     widest = max((s.gap for s in measure_seams(sewn)), default=0.0)
     if sewn.topology is None or widest <= SEAM_SHARE * diagonal:
         return widest
-    drawn, _ = retrace(Draft(sewn, sewn.topology), Limits.of(diagonal))
+    drawn, _, _ = retrace(Draft(sewn, sewn.topology), Limits.of(diagonal))
     return max(
         (s.gap for s in measure_seams(replace(drawn.assembly, topology=drawn.topology, native=None))), default=0.0
     )

@@ -38,7 +38,7 @@ def _simply(step: Callable[[Draft, Limits, Collection[int]], tuple[Draft, Change
 
 STEPS: tuple[tuple[str, Step], ...] = (
     ("loops turned round", _simply(turned_loops)),
-    ("trims drawn anew", _simply(lambda draft, limits, bad: retrace(draft, limits, faces=bad))),
+    ("trims drawn anew", retrace),
     ("tiny edges taken out", _simply(without_tiny_edges)),
     ("face replaced", new_faces),
 )

@@ -8,7 +8,7 @@ surfaces and poles keep their side. Surfaces and edges stay; a pcurve stays wher
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -23,10 +23,12 @@ from patchwright.models.nurbs_curve import NurbsCurve
 from patchwright.models.nurbs_surface import NurbsSurface
 from patchwright.models.surface import Surface
 from patchwright.models.topology import EdgeUse, Topology
-from patchwright.repair.cad_draft import Change, Draft, Limits, apart
+from patchwright.repair.cad_draft import Attempt, Change, Draft, Limits, apart
+from patchwright.repair.loop_shape import polygon, signed_area
 from patchwright.repair.pcurves import fitted, joined, parameters, widened
 from patchwright.repair.result import Rung
 
+WHAT = "trims drawn anew"
 STEPS = 12  # of Gauss and Newton: feet within a hundredth of the curvature radius settle in three
 PROBES = 8  # per span of an edge
 BETTER = 0.8  # of the old pcurve's distance: a new one that is not nearer than this is not taken
@@ -51,8 +53,10 @@ class Traced:
     moved: float
 
 
-def retrace(draft: Draft, limits: Limits, *, faces: Collection[int] = ()) -> tuple[Draft, tuple[Change, ...]]:
-    """The draft with better pcurves where they stray from their edges.
+def retrace(
+    draft: Draft, limits: Limits, faces: Collection[int] = ()
+) -> tuple[Draft, tuple[Change, ...], tuple[Attempt, ...]]:
+    """The draft with better pcurves where they stray from their edges, what changed, and where they would turn a loop.
 
     Looked at are the edges whose two surfaces are farther apart than a closed seam, the free edges, and all edges of
     `faces`.
@@ -65,6 +69,7 @@ def retrace(draft: Draft, limits: Limits, *, faces: Collection[int] = ()) -> tup
     loops: dict[int, Loops] = {}
     surfaces: dict[int, Surface] = {}
     changes: list[Change] = []
+    failed: list[Attempt] = []
     for face, own in enumerate(draft.topology.loops):
         if limits.expired:
             break
@@ -80,14 +85,23 @@ def retrace(draft: Draft, limits: Limits, *, faces: Collection[int] = ()) -> tup
                         worst, moved, count = max(worst, found.residual), max(moved, found.moved), count + 1
                 row.append(use)
             rows.append(tuple(row))
-        if count:
+        if count and not _same_way(own, rows):
+            failed.append(Attempt(WHAT, (face,), "its loop would run the other way round", draft.middle(face)))
+        elif count:
             loops[face] = tuple(tuple(replace(use, pcurve=_inside(use.pcurve, surface)) for use in row) for row in rows)
             topology, loops[face] = over_poles(topology, surface, loops[face], limits)
             surfaces[face] = surface
             changes.append(_change(draft, face, count, worst, moved, limits))
-    if not changes:
-        return draft, ()
-    return draft.with_surfaces(surfaces, with_loops(topology, loops), same=True), tuple(changes)
+    if changes:
+        draft = draft.with_surfaces(surfaces, with_loops(topology, loops), same=True)
+    return draft, tuple(changes), tuple(failed)
+
+
+def _same_way(before: Loops, after: Sequence[Sequence[EdgeUse]]) -> bool:
+    """Whether every loop still runs the way it did in the parameters."""
+    return all(
+        signed_area(polygon(old)) * signed_area(polygon(new)) > 0.0 for old, new in zip(before, after, strict=True)
+    )
 
 
 def traced(surface: Surface, curve: NurbsCurve, use: EdgeUse, limits: Limits, least: float) -> Traced | None:
@@ -252,7 +266,7 @@ def _image(surface: Surface, pcurve: NurbsCurve, t: Array) -> Array:
 
 def _change(draft: Draft, face: int, count: int, worst: float, moved: float, limits: Limits) -> Change:
     return Change(
-        "trims drawn anew on their own surface",
+        WHAT,
         Rung.CUT,
         (face,),
         f"{count} of its pcurves strayed from the edges in space; the new ones follow them to {worst:.2g}",

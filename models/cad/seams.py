@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import nan
+from typing import Any, cast
 
 import numpy as np
 
 from patchwright.models.arrays import Array, IntArray
 from patchwright.models.assembly import Assembly
-from patchwright.models.errors import ParameterError
+from patchwright.models.errors import GeometryError, ParameterError
+from patchwright.models.extension import surface_on
 from patchwright.models.nurbs_curve import NurbsCurve
+from patchwright.models.nurbs_surface import NurbsSurface
+from patchwright.models.surface import Surface
 from patchwright.models.topology import Topology
 
 _PROBES = 33  # samples per edge where only its deviation is asked
@@ -120,7 +124,7 @@ def edge_deviation(assembly: Assembly, samples: int = _PROBES) -> Array:
 
 def _deviation(assembly: Assembly, topology: Topology, uses: IntArray, samples: int) -> Array:
     """(e,) of `edge_deviation` at equally spaced samples of some uses, zero for the edges of no such use."""
-    points, _, _ = _on_surfaces(assembly, topology, uses, samples, with_normals=False)
+    points, _, _ = _on_surfaces(assembly, topology, uses, samples, with_normals=False, carried_on=True)
     edges, place = np.unique(uses[:, 0], return_inverse=True)
     curves = np.stack([_sampled(topology.curves[int(edge)], samples) for edge in edges])
     out = np.zeros(len(topology.curves))
@@ -156,9 +160,13 @@ def _sampled(curve: NurbsCurve, samples: int) -> Array:
 
 
 def _on_surfaces(
-    assembly: Assembly, topology: Topology, uses: IntArray, samples: int, *, with_normals: bool
-) -> tuple[Array, Array, Array]:
-    """Points and outward unit normals (k, samples, 3) of every use on its face's surface, and `beyond` (k,)."""
+    assembly: Assembly, topology: Topology, uses: IntArray, samples: int, *, with_normals: bool,
+    carried_on: bool = False,
+) -> tuple[Array, Array, Array]:  # fmt: skip
+    """Points and outward unit normals (k, samples, 3) of every use on its face's surface, and `beyond` (k,).
+
+    Beyond its ranges the surface is taken at its border, or where the kernel would take it: carried on.
+    """
     points, normals = np.zeros((len(uses), samples, 3)), np.zeros((len(uses), samples, 3))
     beyond = np.zeros(len(uses))
     starts = np.flatnonzero(np.diff(uses[:, 1], prepend=-1))
@@ -169,6 +177,9 @@ def _on_surfaces(
         uv = np.stack([_sampled(topology.loops[face][n][p].pcurve, samples) for _, _, n, p in uses[low:high]])
         bottom, top = np.array(surface.domain, dtype=np.float64).T
         inside = np.clip(uv, bottom, top)
+        if carried_on and not np.array_equal(inside, uv):
+            surface = _carried_on(surface, uv)
+            inside = np.clip(uv, *np.array(surface.domain, dtype=np.float64).T)
         size = np.where(np.isfinite(top - bottom), top - bottom, 1.0)
         beyond[low:high] = (np.abs(inside - uv) / size).max(axis=(1, 2))
         u, v = inside[..., 0], inside[..., 1]
@@ -180,3 +191,19 @@ def _on_surfaces(
             sign = -1.0 if topology.flipped[face] else 1.0
             normals[low:high] = np.divide(sign * normal, length, out=np.zeros_like(normal), where=length > tiny)
     return points, normals, beyond
+
+
+def _carried_on(surface: Surface, uv: Array) -> Surface:
+    """The surface on ranges that hold all of `uv` (..., 2); as it is where it cannot be carried on so far."""
+    low, high = np.array(surface.domain, dtype=np.float64).T
+    least, most = uv.reshape(-1, 2).min(axis=0), uv.reshape(-1, 2).max(axis=0)
+    if (np.maximum(low - least, most - high) > high - low).any():
+        return surface
+    (u0, v0), (u1, v1) = np.minimum(low, least).tolist(), np.maximum(high, most).tolist()
+    try:
+        if isinstance(surface, NurbsSurface):
+            return surface_on(surface, (u0, u1), (v0, v1))
+        wider: Any = surface
+        return cast(Surface, replace(wider, u=(u0, u1), v=(v0, v1)))
+    except GeometryError:
+        return surface
