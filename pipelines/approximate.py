@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -83,7 +83,8 @@ def run_approximate(
             begin = time.perf_counter()
             patch = approximate(spec.sides, model, wanted.tolerance, progress=report, **spec.options)
             made.append(NamedPatch(spec.name, patch, time.perf_counter() - begin))
-    run = ApproximateRun(str(source), model.unit, tuple(made))
+    notes = (wanted.note,) if wanted.note else ()
+    run = ApproximateRun(str(source), model.unit, tuple(made), notes=notes)
     with terminal.stage("write") as report:
         report(f"writing {output.name}", 0.0)
         output.parent.mkdir(parents=True, exist_ok=True)
@@ -95,7 +96,7 @@ def run_approximate(
         picture = output.with_suffix(".png")
         sentence = draw_scenes([side_by_side(picture, source.name, model, [p.patch for p in made])])
     files = (output.name, listing.name) + ((picture.name,) if sentence is None else ())
-    return ApproximateRun(run.source, run.unit, run.patches, files, () if sentence is None else (sentence,))
+    return replace(run, files=files, notes=notes if sentence is None else (*notes, sentence))
 
 
 def surfaces_of(run: ApproximateRun) -> Assembly:
@@ -112,12 +113,15 @@ def side_by_side(path: Path, title: str, model: Assembly, patches: list[LocalPat
     for patch in patches:
         flat = patch.points.reshape(-1, 3)
         box = np.stack([np.minimum(box[0], flat.min(axis=0)), np.maximum(box[1], flat.max(axis=0))])
-    right = np.cross([0.0, 0.0, 1.0], DIRECTION)
+    eye = _towards(patches)
+    right = np.cross([0.0, 0.0, 1.0], eye)
     right /= np.linalg.norm(right)
     corners = np.array([[x, y, z] for x in box[:, 0] for y in box[:, 1] for z in box[:, 2]])
     shift = right * APART * float(np.ptp(corners @ right))
     both = np.stack([np.minimum(box[0], box[0] + shift), np.maximum(box[1], box[1] + shift)])
-    scene = Scene(path, f"{title}: the geometry with the sides given (left), the approximation (right)", both)
+    scene = Scene(
+        path, f"{title}: the geometry with the sides given (left), the approximation (right)", both, direction=eye
+    )
     scene.surface(body, edges=len(body) < 5000)
     for patch in patches:
         sides = (patch.sides.south, patch.sides.east, patch.sides.north, patch.sides.west)
@@ -134,6 +138,18 @@ def side_by_side(path: Path, title: str, model: Assembly, patches: list[LocalPat
         scene.lines(np.concatenate([_chords(line) for line in lines]) + shift, colour=INNER, width=1.0)
         scene.lines(np.concatenate([_chords(c) for c in (P[0], P[-1], P[:, 0], P[:, -1])]), colour=SIDE, width=3.0)
     return scene
+
+
+def _towards(patches: list[LocalPatch]) -> tuple[float, float, float]:
+    """From the model to the eye: the usual direction, mirrored so that most of the patches face it."""
+    normal = np.zeros(3)
+    for patch in patches:
+        corner = patch.points[[0, -1, -1, 0], [0, 0, -1, -1]]
+        normal += np.cross(corner[2] - corner[0], corner[3] - corner[1])
+    usual = np.array(DIRECTION)
+    seen = np.where(np.abs(normal) < 1e-3 * np.abs(normal).max(), usual, np.abs(usual) * np.sign(normal))
+    x, y, z = seen.tolist()
+    return x, y, z
 
 
 def _chords(points: Array) -> Array:
@@ -160,6 +176,7 @@ def approximate_json(run: ApproximateRun) -> dict[str, Any]:
         "source": run.source,
         "unit": run.unit,
         "converged": run.converged,
+        "notes": list(run.notes),
         "patches": [_patch_json(p) for p in run.patches],
     }
 

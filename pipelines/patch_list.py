@@ -57,10 +57,11 @@ class PatchSpec:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PatchList:
-    """All patches, and the tolerance they share, a length."""
+    """All patches, and the tolerance they share, a length; `note` says where it comes from."""
 
     patches: tuple[PatchSpec, ...]
     tolerance: float
+    note: str = ""
 
 
 def load_patches(path: Path, model: Assembly, tolerance: float | None = None) -> PatchList:
@@ -93,6 +94,7 @@ def load_patches(path: Path, model: Assembly, tolerance: float | None = None) ->
     limits = Tolerance.of(model, fit=wanted)
     shared = _options(path, table)
     source = _Source(model, PatchGround.of(model))
+    fit, note = _allowed(limits, source.ground, model)
     patches = []
     for i, entry in enumerate(entries, start=1):
         if not isinstance(entry, dict):
@@ -104,7 +106,23 @@ def load_patches(path: Path, model: Assembly, tolerance: float | None = None) ->
         except GeometryError as error:
             raise type(error)(f"{path}: patch {name!r}: {error}") from None
         patches.append(PatchSpec(name, sides, shared | _options(path, entry)))
-    return PatchList(tuple(patches), limits.fit)
+    return PatchList(tuple(patches), fit, note)
+
+
+def _allowed(limits: Tolerance, ground: PatchGround, model: Assembly) -> tuple[float, str]:
+    """The fit tolerance the data can carry, and a note where it is wider than 1e-4 of the diagonal, or too narrow."""
+    if model.is_cad:
+        return limits.fit, ""
+    from patchwright.repair.faceting import faceting
+    from patchwright.repair.mesh_route import WIDEST
+
+    height = faceting(ground.body, limits.angle)
+    if height <= limits.fit:
+        return limits.fit, ""
+    told = f"the facets of the geometry stand up to {height:.3g} below a smooth surface"
+    if limits.given:
+        return limits.fit, f"{told}, more than the tolerance: a smooth patch may not reach it"
+    return min(height, WIDEST * limits.fit), f"{told}: that is the tolerance, as none was given"
 
 
 def _known(path: Path, table: dict[str, Any], known: set[str], what: str) -> None:
@@ -159,8 +177,9 @@ class _Source:
                 made.append(self.side(entry[name]))
             except GeometryError as error:
                 raise type(error)(f"{name}: {error}") from None
-        drawn = Sides.of(made[0], made[1], made[2], made[3], reach)
         south, east, north, west = (bool(entry[name].get("laid", False)) for name in SIDES)
+        firm = (not south, not east, not north, not west)
+        drawn = Sides.of(made[0], made[1], made[2], made[3], reach, firm)
         return laid(drawn, self.ground.under(drawn), (south, east, north, west))
 
     def side(self, told: Any) -> Side:

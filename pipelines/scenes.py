@@ -27,6 +27,8 @@ class Scene:
     box: Array
     layers: list[dict[str, Any]] = field(default_factory=list)
     arrays: dict[str, Any] = field(default_factory=dict)
+    direction: tuple[float, float, float] | None = None
+    """From the model to the eye; None for the usual one."""
 
     def surface(
         self, triangulation: Triangulation, *, values: Any = None, colours: Any = None, **options: Any
@@ -60,7 +62,14 @@ class Scene:
 def draw_scenes(scenes: list[Scene]) -> str | None:
     """Draw all scenes; returns None, or the sentence that says why there are no pictures."""
     listing: list[dict[str, Any]] = [
-        {"path": str(s.path), "title": s.title, "box": np.asarray(s.box).tolist(), "layers": s.layers} for s in scenes
+        {
+            "path": str(s.path),
+            "title": s.title,
+            "box": np.asarray(s.box).tolist(),
+            "layers": s.layers,
+            **({} if s.direction is None else {"direction": s.direction}),
+        }
+        for s in scenes
     ]
     arrays: dict[str, Any] = {}
     for scene in scenes:

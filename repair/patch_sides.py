@@ -67,25 +67,35 @@ class Sides:
     west: Side
 
     @classmethod
-    def of(cls, south: Side, east: Side, north: Side, west: Side, tolerance: float) -> Sides:
+    def of(
+        cls,
+        south: Side,
+        east: Side,
+        north: Side,
+        west: Side,
+        tolerance: float,
+        firm: tuple[bool, bool, bool, bool] = (True, True, True, True),
+    ) -> Sides:
         """Four sides in the order south, east, north, west, each in either direction, made to run along +u and +v.
+
+        Parameters
+        ----------
+        tolerance : sides that miss each other by no more are moved onto one corner
+        firm : which of the sides lie where they should; a corner of one that does and one that does not is the first's,
+            any other is midway
 
         Raises
         ------
-        GeometryError : sides that do not meet within `tolerance`; names the corner and the gap.
+        GeometryError : sides that do not meet; names the corner and the gap.
         """
         south, east, north, west = _directed(south, east, north, west)
         check_corners(south.ends, north.ends, west.ends, east.ends, tolerance)
-        corner = [0.5 * (a + b) for a, b in (
-            (south.ends[0], west.ends[0]), (south.ends[1], east.ends[0]),
-            (north.ends[1], east.ends[1]), (north.ends[0], west.ends[1]),
-        )]  # fmt: skip
-        return cls(
-            _pinned(south, corner[0], corner[1]),
-            _pinned(east, corner[1], corner[2]),
-            _pinned(north, corner[3], corner[2]),
-            _pinned(west, corner[0], corner[3]),
-        )
+        on = dict(zip(("s", "e", "n", "w"), firm, strict=True))
+        sw = _corner(south.ends[0], west.ends[0], on["s"], on["w"])
+        se = _corner(south.ends[1], east.ends[0], on["s"], on["e"])
+        ne = _corner(north.ends[1], east.ends[1], on["n"], on["e"])
+        nw = _corner(north.ends[0], west.ends[1], on["n"], on["w"])
+        return cls(_pinned(south, sw, se), _pinned(east, se, ne), _pinned(north, nw, ne), _pinned(west, sw, nw))
 
     def rows(self, u: Array, v: Array) -> tuple[Array, Array, Array, Array]:
         """Points of south, north (M + 1, 3) at shares u and of west, east (N + 1, 3) at shares v of the arc length."""
@@ -210,6 +220,12 @@ def _laid(side: Side, drawn: Array, normal: Array, ground: Ground, reach: float,
     step = np.linalg.norm(np.diff(on, axis=0), axis=1)
     keep = np.concatenate([[True], step > 1e-3 * step.mean()])
     return Side(interpolate(on[keep], "c2-cubic", "chord"), f"{side.source}, laid on the geometry")
+
+
+def _corner(one: Array, other: Array, one_firm: bool, other_firm: bool) -> Array:
+    if one_firm != other_firm:
+        return one if one_firm else other
+    return np.asarray(0.5 * (one + other))
 
 
 def _directed(south: Side, east: Side, north: Side, west: Side) -> tuple[Side, Side, Side, Side]:
