@@ -94,7 +94,7 @@ def _stepped(
     start = Draft(model, model.topology)
     draft, changes, failed = step(start, limits, bad)
     wrong: set[int] = set()
-    flat = _flat(model, limits)
+    plain = False
     for _ in range(AGAIN):
         if not changes:
             break
@@ -102,7 +102,12 @@ def _stepped(
         if made is None:
             return model, bad, (), (*failed, *in_vain(what, changes, "the CAD kernel cannot build it"))
         now = bad_faces(made)
-        worse = now - bad - flat
+        worse = now - bad
+        if worse and not plain:  # what the kernel makes of the model as it was: its triangles may be from elsewhere
+            plain = True
+            as_it_was = built(model, start)
+            bad = bad | (bad_faces(as_it_was) if as_it_was is not None else set())
+            worse = now - bad
         if not worse:
             if widest(made) > max(widest(model), 2.0 * limits.on) or folds(made) > folds(model):
                 return model, bad, (), (*failed, *in_vain(what, changes, "its seams are worse than before"))
@@ -124,15 +129,6 @@ def _with_old(draft: Draft, start: Draft, faces: set[int]) -> Draft:
     flipped = tuple(old[i] if i in faces else flip for i, flip in enumerate(draft.topology.flipped))
     parts = tuple(start.parts[i] if i in faces else part for i, part in enumerate(draft.parts))
     return Draft(replace(draft.assembly, parts=parts), replace(loops, flipped=flipped))
-
-
-def _flat(model: Assembly, limits: Limits) -> set[int]:
-    """Faces narrower than a closed seam: whether the kernel finds triangles for them says nothing."""
-    return {
-        i
-        for i, part in enumerate(model.parts)
-        if len(part.triangulation) and part.triangulation.areas.sum() <= 2.0 * limits.on * part.triangulation.diagonal
-    }
 
 
 def _beside(draft: Draft, faces: set[int]) -> set[int]:
