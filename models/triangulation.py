@@ -110,8 +110,10 @@ class Triangulation:
         """(2, 3) lowest and highest coordinates of the vertices in use; zeros when there are none."""
         if not len(self):
             return np.zeros((2, 3))
-        used = self.vertices[self.triangles.reshape(-1)]
-        return np.stack([used.min(axis=0), used.max(axis=0)])
+        used = np.zeros(len(self.vertices), dtype=np.bool_)
+        used[self.triangles] = True
+        columns = [self.vertices[used, k] for k in range(3)]
+        return np.array([[c.min() for c in columns], [c.max() for c in columns]])
 
     @property
     def diagonal(self) -> float:

@@ -108,19 +108,20 @@ def borders_of(triangulation: Triangulation, adjacency: Adjacency | None = None)
     start, end = triangles[which, corner], triangles[which, (corner + 1) % 3]
     key = start * len(points) + end
     order = np.argsort(key)
-    rims = []
-    for loop in loops:
-        ahead = np.roll(loop, -1)
-        at = np.searchsorted(key[order], loop * len(points) + ahead)
-        at = order[np.minimum(at, len(order) - 1)]
-        owner = which[at]
-        p, q = points[loop], points[ahead]
-        apex = points[triangles[owner, (corner[at] + 2) % 3]]
-        normal = np.cross(q - p, apex - p)
-        normal = _unit(normal)
-        outward = _unit(np.cross(q - p, normal))
-        rims.append(Border(loop, p, normal, outward, owner))
-    return tuple(rims)
+    sizes = np.array([len(loop) for loop in loops])
+    stops = np.cumsum(sizes)
+    flat = np.concatenate(loops)
+    ahead = np.roll(flat, -1)
+    ahead[stops - 1] = flat[stops - sizes]
+    at = np.searchsorted(key[order], flat * len(points) + ahead)
+    at = order[np.minimum(at, len(order) - 1)]
+    owner = which[at]
+    p, q = points[flat], points[ahead]
+    apex = points[triangles[owner, (corner[at] + 2) % 3]]
+    normal = _unit(np.cross(q - p, apex - p))
+    outward = _unit(np.cross(q - p, normal))
+    parts = [np.split(array, stops[:-1]) for array in (p, normal, outward, owner)]
+    return tuple(Border(*row) for row in zip(loops, *parts, strict=True))
 
 
 def facing_pairs(rims: tuple[Border, ...]) -> list[tuple[int, int]]:
@@ -301,6 +302,8 @@ def _nearest(rim: Border, points: Array) -> Array:
 def _main(tags: IntArray | None, triangles: IntArray) -> int:
     """A triangle of the rim with the tag most of the rim has."""
     if tags is None:
+        return int(triangles[0])
+    if (tags[triangles] == tags[triangles[0]]).all():
         return int(triangles[0])
     values, counts = np.unique(tags[triangles], return_counts=True)
     return int(triangles[np.flatnonzero(tags[triangles] == values[np.argmax(counts)])[0]])

@@ -43,26 +43,18 @@ def drop_duplicates(triangulation: Triangulation) -> Cleaned:
     thickness: where more of its border edges have their two triangles without it than lack one.
     """
     from patchwright.repair._orient_kernel import walk
+    from patchwright.repair._weld_kernel import merge_exact
 
     count = len(triangulation)
     keep = np.ones(count, dtype=np.bool_)
     if not count:
         return _keep(triangulation, keep)
     key = np.sort(triangulation.triangles, axis=1)
-    order = np.lexsort(key.T[::-1])
-    ordered = key[order]
-    first = np.ones(count, dtype=np.bool_)
-    first[1:] = (ordered[1:] != ordered[:-1]).any(axis=1)
-    group = np.empty(count, dtype=np.int64)
-    group[order] = np.cumsum(first) - 1
-    size = np.bincount(group)
-    if size.max() == 1:
+    group = merge_exact(key)  # the first copy in the input's own order
+    lead = group == np.arange(count)
+    if lead.all():
         return _keep(triangulation, keep)
-    lead = np.zeros(count, dtype=np.bool_)
-    # the copy to keep is the first in the input's own order
-    leader = np.full(len(size), count, dtype=np.int64)
-    np.minimum.at(leader, group, np.arange(count))
-    lead[leader] = True
+    size = np.bincount(group, minlength=count)
     double = size[group] > 1
     keep = lead.copy()
     # patches of doubles: one copy each, connected through edges among themselves

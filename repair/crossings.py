@@ -21,5 +21,6 @@ def crossing_pairs(triangulation: Triangulation, depth: float) -> IntArray:
 
     if len(triangulation) < 2:
         return np.zeros((0, 2), dtype=np.int64)
-    pairs = np.ascontiguousarray(Tree.of(triangulation).pairs(), dtype=np.int64).reshape(-1, 2)
-    return np.asarray(pairs[crossing(pairs, triangulation.vertices, triangulation.triangles, depth)])
+    pairs = np.ascontiguousarray(Tree.of(triangulation).touching(), dtype=np.int64).reshape(-1, 2)
+    found = pairs[crossing(pairs, triangulation.vertices, triangulation.triangles, depth)]
+    return np.asarray(found[np.lexsort(found.T[::-1])])

@@ -19,7 +19,6 @@ from patchwright.models.arrays import Array, frozen
 from patchwright.models.errors import ParameterError
 from patchwright.models.tolerance import Tolerance
 from patchwright.models.triangulation import Triangulation
-from patchwright.repair.crossings import CROSSING, crossing_pairs
 from patchwright.repair.decisions import Decisions
 from patchwright.repair.mend_cure import cure
 from patchwright.repair.mend_gaps import bridge_gaps
@@ -101,7 +100,7 @@ def _verify(work: Work) -> None:
             points = work.now.vertices[adjacency.edges[wrong]].reshape(-1, 3)
             size = float(np.linalg.norm(np.ptp(points, axis=0)))
             work.problems.append(Problem(kind, points.mean(axis=0), size, f"{int(wrong.sum())} {message}"))
-    pairs = crossing_pairs(work.now, CROSSING * work.tolerance.gap)
+    pairs = work.crossings()
     if len(pairs):
         some = work.now.take(np.unique(pairs))
         message = f"{len(some)} triangles still pass through each other"

@@ -8,7 +8,6 @@ from patchwright.models.adjacency import Adjacency
 from patchwright.models.arrays import BoolArray
 from patchwright.models.triangulation import Triangulation
 from patchwright.repair.clean import split_non_manifold
-from patchwright.repair.crossings import CROSSING, crossing_pairs
 from patchwright.repair.mend_gaps import bridge_gaps
 from patchwright.repair.mended import Work
 from patchwright.repair.orient import orient
@@ -22,8 +21,7 @@ def cure(work: Work) -> None:
 
     Small places only, each try a ring wider; a cure that opens what cannot be bridged is undone.
     """
-    depth = CROSSING * work.tolerance.gap
-    bad = _bad(work.now, depth)
+    bad = _bad(work)
     for ring in range(CURES):
         if not bad.any():
             return
@@ -40,7 +38,7 @@ def cure(work: Work) -> None:
         work.follow(work.now.take(left), left)
         work.now = orient(split_non_manifold(work.now)).triangulation
         bridge_gaps(work, opened)
-        after = _bad(work.now, depth)
+        after = _bad(work)
         if after.sum() < bad.sum() and _free_length(work.now) <= rims * (1.0 + 1e-9):
             bad = after
         else:
@@ -82,12 +80,12 @@ def _small_places(triangulation: Triangulation, some: BoolArray) -> BoolArray:
     return small
 
 
-def _bad(triangulation: Triangulation, depth: float) -> BoolArray:
+def _bad(work: Work) -> BoolArray:
     """(m,) triangles at edges used too often or run the same way twice, or crossing others of their component."""
-    adjacency = Adjacency.of(triangulation)
+    adjacency = Adjacency.of(work.now)
     wrong = (adjacency.use_count > 2) | adjacency.inconsistent
     bad = np.asarray(wrong[adjacency.triangle_edges].any(axis=1))
-    pairs = crossing_pairs(triangulation, depth)
+    pairs = work.crossings()
     if len(pairs):
         label = np.asarray(adjacency.components())
         pairs = pairs[label[pairs[:, 0]] == label[pairs[:, 1]]]

@@ -11,12 +11,14 @@ from patchwright.repair.clean import drop_collapsed, drop_duplicates, split_non_
 from patchwright.repair.conform import conform
 from patchwright.repair.mended import Action, Work, middle
 from patchwright.repair.orient import orient
-from patchwright.repair.weld import contract_short, weld, weld_distance
+from patchwright.repair.weld import Copies, contract_short, reach_of, weld, weld_distance
 
 
 def weld_copies(work: Work) -> None:
-    distance, reason = weld_distance(work.now, work.tolerance)
-    welded = weld(work.now, distance)
+    copies = Copies.of(work.now, reach_of(work.tolerance))
+    distance, reason = weld_distance(work.now, work.tolerance, copies)
+    welded = weld(work.now, distance, copies)
+    del copies
     work.noise, work.distance = welded.noise, distance
     work.now = welded.triangulation
     if welded.merged:

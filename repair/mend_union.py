@@ -11,7 +11,6 @@ from patchwright.models.arrays import Array, BoolArray, IntArray
 from patchwright.models.triangulation import Triangulation
 from patchwright.repair.bridge import borders_of
 from patchwright.repair.clean import split_non_manifold
-from patchwright.repair.crossings import CROSSING, crossing_pairs
 from patchwright.repair.mend_gaps import fill
 from patchwright.repair.mended import BRIDGED, STRAY_SHARE, Action, Problem, Work, known, middle
 from patchwright.repair.orient import orient
@@ -88,7 +87,7 @@ def _hull(work: Work, is_cap: BoolArray, body: IntArray, openings: str) -> tuple
 
     A body that merely crosses a cap that goes again does not pass through itself.
     """
-    pairs = crossing_pairs(work.now, CROSSING * work.tolerance.gap)
+    pairs = work.crossings()
     pairs = pairs[body[pairs[:, 0]] == body[pairs[:, 1]]]
     if openings == "keep":
         pairs = pairs[~is_cap[pairs].any(axis=1)]

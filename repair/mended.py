@@ -10,6 +10,7 @@ import numpy as np
 from patchwright.models.arrays import Array, BoolArray, IntArray
 from patchwright.models.tolerance import Tolerance
 from patchwright.models.triangulation import Triangulation
+from patchwright.repair.crossings import CROSSING, crossing_pairs
 
 if TYPE_CHECKING:
     from patchwright.repair.decisions import Decisions
@@ -112,6 +113,13 @@ class Work:
     noise: float = 0.0
     distance: float = 0.0  # the weld distance
     decisions: Decisions | None = None  # what stays as it is
+    crossed: tuple[Triangulation, IntArray] | None = None  # the last triangulation asked for crossings, and those
+
+    def crossings(self) -> IntArray:
+        """(k, 2) pairs of triangles of the present state that pass through each other."""
+        if self.crossed is None or self.crossed[0] is not self.now:
+            self.crossed = self.now, crossing_pairs(self.now, CROSSING * self.tolerance.gap)
+        return self.crossed[1]
 
     def follow(self, triangulation: Triangulation, parents: IntArray, cut: BoolArray | None = None) -> None:
         """Take over a stage's result: `parents` index the triangles before it, -1 are new."""

@@ -68,8 +68,39 @@ class _Pairs:
     kind: IntArray
 
 
-def weld(triangulation: Triangulation, distance: float) -> Welded:
+@dataclass(frozen=True, slots=True, eq=False)
+class Copies:
+    """Free edges of a triangulation that may be copies of each other: found once, for all distances up to one.
+
+    `labels` (n,) are the exact copies of its vertices, `pairs` the candidates within `distance`.
+    """
+
+    labels: IntArray
+    free: FreeEdges
+    pairs: _Pairs
+    distance: float
+
+    @classmethod
+    def of(cls, triangulation: Triangulation, distance: float) -> Copies:
+        """The candidates within `distance` (0: none)."""
+        labels = exact_labels(triangulation.vertices)
+        free = free_edges(labels[triangulation.triangles], triangulation.tags)
+        return cls(labels, free, _candidates(triangulation.vertices, free, distance), distance)
+
+    def within(self, distance: float) -> _Pairs:
+        """The candidates within a distance, in the order they should be tried."""
+        return _ordered(self.pairs, distance)
+
+
+def reach_of(tolerance: Tolerance) -> float:
+    """How far apart `weld_distance` looks for copies."""
+    return PLATEAU * max(2.0 * tolerance.fit, tolerance.gap)
+
+
+def weld(triangulation: Triangulation, distance: float, copies: Copies | None = None) -> Welded:
     """Merge the copies of a point that lie within `distance` of each other (0: only equal ones).
+
+    `copies` : of the same triangulation, when they are at hand.
 
     Raises
     ------
@@ -77,11 +108,13 @@ def weld(triangulation: Triangulation, distance: float) -> Welded:
     """
     if not (np.isfinite(distance) and distance >= 0.0):
         raise ParameterError(f"the weld distance must be a length of at least 0, got {distance}")
-    first = exact_labels(triangulation.vertices)
+    first = exact_labels(triangulation.vertices) if copies is None else copies.labels
     root = first
+    if copies is not None and copies.distance < distance:
+        copies = None
     if distance > 0.0 and len(triangulation):
-        for _ in range(3):
-            step = _weld_step(root, triangulation, distance)
+        for turn in range(3):
+            step = _weld_step(root, triangulation, distance, copies if turn == 0 else None)
             if step is None:
                 break
             root = step[root]
@@ -112,24 +145,26 @@ def exact_labels(vertices: Array) -> IntArray:
     return np.asarray(merge_exact((np.ascontiguousarray(vertices) + 0.0).view(np.int64)))
 
 
-def free_edge_curve(triangulation: Triangulation, distances: npt.ArrayLike) -> IntArray:
+def free_edge_curve(triangulation: Triangulation, distances: npt.ArrayLike, copies: Copies | None = None) -> IntArray:
     """How many edges are still used by one triangle only after welding within each of `distances` (k,).
 
     One matching serves all distances: a pair counts from the distance on at which its ends meet.
     """
     wanted = np.atleast_1d(np.asarray(distances, dtype=np.float64))
-    free, gaps = _match_gaps(triangulation, float(wanted.max(initial=0.0)))
+    free, gaps = _match_gaps(triangulation, float(wanted.max(initial=0.0)), copies)
     return free - 2 * np.searchsorted(np.sort(gaps), wanted * (1.0 + 1e-12), side="right").astype(np.int64)
 
 
-def weld_distance(triangulation: Triangulation, tolerance: Tolerance) -> tuple[float, str]:
+def weld_distance(
+    triangulation: Triangulation, tolerance: Tolerance, copies: Copies | None = None
+) -> tuple[float, str]:
     """The weld distance the data itself shows, never below `tolerance.gap`, and why.
 
     The number of free edges falls with the distance and then stays: the copies of a point are all found. That start of
     a plateau is taken, if it moves no corner farther than the fit tolerance; what is farther apart is a gap.
     """
     most = 2.0 * tolerance.fit
-    free, gaps = _match_gaps(triangulation, PLATEAU * max(most, tolerance.gap))
+    free, gaps = _match_gaps(triangulation, reach_of(tolerance), copies)
     gaps = np.sort(gaps)
     floor = int(np.searchsorted(gaps, tolerance.gap, side="right"))
     within = int(np.searchsorted(gaps, most * (1.0 + 1e-9), side="right"))
@@ -158,8 +193,10 @@ def _merge(triangulation: Triangulation, first: IntArray, root: IntArray) -> Wel
     points = triangulation.vertices
     used = np.zeros(len(first), dtype=np.bool_)
     used[triangulation.triangles] = True
-    kept, clusters = np.unique(root, return_inverse=True)
-    clusters = clusters.reshape(-1).astype(np.int64)
+    lead = np.zeros(len(root), dtype=np.bool_)
+    lead[root] = True
+    kept = np.flatnonzero(lead)
+    clusters = (np.cumsum(lead) - 1)[root]
     place = points[kept].copy()
     # only clusters of different coordinates get a new place: the mean over the corners in use
     inner = used & (root != first)
@@ -187,36 +224,41 @@ def _merge(triangulation: Triangulation, first: IntArray, root: IntArray) -> Wel
 
 def free_edges(triangles: IntArray, tags: IntArray | None) -> FreeEdges:
     """Edges used by exactly one triangle, collapsed triangles left out."""
+    from patchwright.repair._group_kernel import single_sides
+
     a, b, c = triangles.T
     whole = (a != b) & (b != c) & (c != a)
     index = np.flatnonzero(whole)
     corners = triangles[index]
     start = corners.reshape(-1)
-    end = corners[:, [1, 2, 0]].reshape(-1)
-    apex = corners[:, [2, 0, 1]].reshape(-1)
-    key = np.minimum(start, end) * (int(triangles.max(initial=0)) + 1) + np.maximum(start, end)
-    order = np.argsort(key)
-    ordered = key[order]
-    single = np.ones(len(key), dtype=np.bool_)
-    same = ordered[1:] == ordered[:-1]
-    single[1:] &= ~same
-    single[:-1] &= ~same
-    pick = np.sort(order[single])
-    owner = index[pick // 3]
+    pick = single_sides(corners, int(triangles.max(initial=-1)) + 1)
+    of, side = pick // 3, pick % 3
+    owner = index[of]
     tag = np.zeros(len(pick), dtype=np.int64) if tags is None else tags[owner]
-    return FreeEdges(start[pick], end[pick], apex[pick], owner, tag)
+    return FreeEdges(start[pick], corners[of, (side + 1) % 3], corners[of, (side + 2) % 3], owner, tag)
 
 
-def _edge_pairs(points: Array, free: FreeEdges, distance: float) -> _Pairs:
-    """Candidate pairs of free edges in the order they should be tried."""
+def _candidates(points: Array, free: FreeEdges, distance: float) -> _Pairs:
+    """Pairs of free edges whose ends lie within `distance`."""
     from patchwright.repair._weld_kernel import edge_candidates
 
+    if distance <= 0.0 or not len(free.start):
+        nothing = np.zeros(0, dtype=np.int64)
+        return _Pairs(nothing, nothing, np.zeros(0), nothing)
     partner, gap, kind = edge_candidates(
         points[free.start], points[free.end], points[free.apex], free.tag, distance, REACH_SHARE
     )
     found = np.flatnonzero((partner >= 0) & ((kind & 5) != 5))  # folded and run the same way: a double, not a neighbour
     left, right = found // partner.shape[1], partner.reshape(-1)[found]
-    gap, kind = gap.reshape(-1)[found], kind.reshape(-1)[found]
+    return _Pairs(left, right, gap.reshape(-1)[found], kind.reshape(-1)[found])
+
+
+def _ordered(pairs: _Pairs, distance: float) -> _Pairs:
+    """The candidates within `distance` in the order they should be tried."""
+    left, right, gap, kind = pairs.left, pairs.right, pairs.gap, pairs.kind
+    near = gap <= distance
+    if not near.all():
+        left, right, gap, kind = left[near], right[near], gap[near], kind[near]
     against = (kind & 4) > 0
     if np.count_nonzero(against) < ORIENTED * len(kind):
         left, right, gap, kind = left[~against], right[~against], gap[~against], kind[~against]
@@ -226,24 +268,26 @@ def _edge_pairs(points: Array, free: FreeEdges, distance: float) -> _Pairs:
 
 def _around(triangles: IntArray, count: int) -> tuple[IntArray, IntArray]:
     """Offsets (n + 1,) and triangles around each vertex."""
-    flat = triangles.reshape(-1)
-    offsets = np.zeros(count + 1, dtype=np.int64)
-    np.cumsum(np.bincount(flat, minlength=count), out=offsets[1:])
-    return offsets, np.argsort(flat, kind="stable") // 3
+    from patchwright.repair._group_kernel import grouped
+
+    offsets, order = grouped(triangles.reshape(-1), count)
+    order //= 3
+    return offsets, order
 
 
-def _match_gaps(triangulation: Triangulation, distance: float) -> tuple[int, Array]:
+def _match_gaps(triangulation: Triangulation, distance: float, copies: Copies | None) -> tuple[int, Array]:
     """The number of free edges among exactly merged vertices, and the distances of the pairs that match."""
     from patchwright.repair._weld_kernel import match_edges
 
     if not len(triangulation):
         return 0, np.zeros(0)
-    points = triangulation.vertices
-    triangles = exact_labels(points)[triangulation.triangles]
-    free = free_edges(triangles, triangulation.tags)
+    if copies is None or copies.distance < distance:
+        copies = Copies.of(triangulation, distance)
+    points, free = triangulation.vertices, copies.free
     if distance <= 0.0 or not len(free.start):
         return len(free.start), np.zeros(0)
-    pairs = _edge_pairs(points, free, distance)
+    triangles = copies.labels[triangulation.triangles]
+    pairs = copies.within(distance)
     offsets, around = _around(triangles, len(points))
     _, mate = match_edges(
         pairs.left, pairs.right, pairs.kind, free.start, free.end, 1.5 * distance, points, triangles,
@@ -257,15 +301,15 @@ def _match_gaps(triangulation: Triangulation, distance: float) -> tuple[int, Arr
     return len(free.start), np.minimum(cross, along)
 
 
-def _weld_step(root: IntArray, triangulation: Triangulation, distance: float) -> IntArray | None:
+def _weld_step(root: IntArray, triangulation: Triangulation, distance: float, copies: Copies | None) -> IntArray | None:
     """One round of edge matching, then of the rims' vertices; each vertex's new root, None when nothing merged."""
     from patchwright.repair._weld_kernel import match_edges, match_points
 
     points, triangles = triangulation.vertices, root[triangulation.triangles]
-    free = free_edges(triangles, triangulation.tags)
+    free = free_edges(triangles, triangulation.tags) if copies is None else copies.free
     if not len(free.start):
         return None
-    pairs = _edge_pairs(points, free, distance)
+    pairs = _ordered(_candidates(points, free, distance), distance) if copies is None else copies.within(distance)
     offsets, around = _around(triangles, len(points))
     step, _ = match_edges(
         pairs.left, pairs.right, pairs.kind, free.start, free.end, 1.5 * distance, points, triangles, offsets,

@@ -6,12 +6,12 @@ import numpy as np
 
 from patchwright.models.arrays import BoolArray, IntArray
 from patchwright.models.tolerance import ROUND_OFF_SHARE
-from patchwright.repair.checks.examination import Examination, box_of
+from patchwright.repair.checks.examination import CURVE_END, Examination, box_of
 from patchwright.repair.checks.regions import plural, regional
 from patchwright.repair.checks.registry import Finding, check
 from patchwright.repair.diagnosis import Defect, Severity
 
-SHARES = (0.0, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3)  # of the diagonal: where the free-edge curve is read
+SHARES = (0.0, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, CURVE_END)  # of the diagonal: where the free-edge curve is read
 
 
 @check("edges", looks="mesh", kinds=("open-edge", "non-manifold-edge"))
@@ -38,7 +38,9 @@ def _curve(exam: Examination) -> list[dict[str, float | int]]:
     from patchwright.repair.weld import free_edge_curve
 
     distances = np.array(SHARES) * exam.diagonal
-    counts = free_edge_curve(exam.raw, distances) if exam.open_edges else np.zeros(len(SHARES), dtype=np.int64)
+    counts = (
+        free_edge_curve(exam.raw, distances, exam.copies) if exam.open_edges else np.zeros(len(SHARES), dtype=np.int64)
+    )
     return [
         {"share": share, "distance": float(distance), "free_edges": int(count)}
         for share, distance, count in zip(SHARES, distances, counts, strict=True)

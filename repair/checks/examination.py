@@ -18,7 +18,9 @@ if TYPE_CHECKING:
     from patchwright.repair.orient import Oriented
     from patchwright.repair.rims import Rim
     from patchwright.repair.surroundings import Surroundings
+    from patchwright.repair.weld import Copies
 
+CURVE_END = 1e-3  # of the diagonal: where the curve of free edges ends
 SMALL_OPENING = 0.05  # of the square root of a component's area: it bounds a body all the same
 
 
@@ -63,13 +65,20 @@ class Examination:
         return int(np.count_nonzero(self.adjacency.free))
 
     @cached_property
+    def copies(self) -> Copies:
+        """Free edges of `raw` that may be copies of each other, as far apart as any check looks for them."""
+        from patchwright.repair.weld import Copies, reach_of
+
+        return Copies.of(self.raw, max(reach_of(self.tolerance), CURVE_END * self.diagonal))
+
+    @cached_property
     def weld_distance(self) -> tuple[float, str]:
         """The distance at which copies of one point are merged, and why; 0 when nothing is open."""
         from patchwright.repair.weld import weld_distance
 
         if not self.open_edges:
             return 0.0, "no edge is free"
-        return weld_distance(self.raw, self.tolerance)
+        return weld_distance(self.raw, self.tolerance, self.copies)
 
     @cached_property
     def welded(self) -> Triangulation:
@@ -77,7 +86,7 @@ class Examination:
         from patchwright.repair.weld import weld
 
         distance = self.weld_distance[0]
-        return weld(self.raw, distance).triangulation if distance > 0.0 else self.merged
+        return weld(self.raw, distance, self.copies).triangulation if distance > 0.0 else self.merged
 
     @cached_property
     def collapsed(self) -> BoolArray:
@@ -87,11 +96,10 @@ class Examination:
     @cached_property
     def duplicate(self) -> BoolArray:
         """(m,) triangles of `welded` over the same three vertices as an earlier one."""
+        from patchwright.repair._weld_kernel import merge_exact
+
         key = np.sort(self.welded.triangles, axis=1)
-        order = np.lexsort((np.arange(len(key)), key[:, 2], key[:, 1], key[:, 0]))
-        again = np.zeros(len(key), dtype=np.bool_)
-        again[order[1:]] = (key[order[1:]] == key[order[:-1]]).all(axis=1)
-        return again & ~self.collapsed
+        return np.asarray((merge_exact(key) != np.arange(len(key))) & ~self.collapsed)
 
     @cached_property
     def flat(self) -> BoolArray:
