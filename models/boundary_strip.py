@@ -69,6 +69,24 @@ def border_space(surface: NurbsSurface, side: Side, extra: Array) -> NurbsCurve:
     return border.insert_knots(_lacking(border.degree, border.knots, extra, border.domain))
 
 
+def border_below(surface: NurbsSurface, side: Side, pcurve: NurbsCurve) -> NurbsCurve | None:
+    """The border of a side below a straight pcurve (degree 1, two points) along it, in the pcurve's parameter.
+
+    None where the pcurve stands still.
+    """
+    along = 1 if side[0] == "u" else 0
+    whole = surface.clamped().boundary(side)
+    a, b = (float(np.clip(x, *whole.domain)) for x in pcurve.control_points[:, along])
+    if a == b:
+        return None
+    part = whole.restricted(min(a, b), max(a, b))
+    part = part.reversed() if a > b else part
+    (s0, s1), (t0, t1) = part.domain, pcurve.domain
+    knots = t0 + (part.knots - s0) * ((t1 - t0) / (s1 - s0))
+    knots[: part.degree + 1], knots[-part.degree - 1 :] = t0, t1
+    return NurbsCurve(part.degree, knots, part.control_points, part.weights)
+
+
 def through(space: NurbsCurve, places: Array) -> NurbsCurve:
     """The curve with the knots and weights of `space` through places (n, 3) at its Greville abscissae."""
     from scipy.interpolate import BSpline

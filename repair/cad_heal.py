@@ -21,6 +21,7 @@ from patchwright.repair.loose_seams import opened
 from patchwright.repair.realign import realign
 from patchwright.repair.retrim import retrim
 from patchwright.repair.seam_join import COARSE, join_seams
+from patchwright.repair.side_strip import strip_sides
 from patchwright.repair.strip import strip
 
 
@@ -95,7 +96,8 @@ def _climbed(draft: Draft, limits: Limits, crossing: bool = True) -> tuple[Draft
         draft, crossed = retrim(draft, limits)
         changes = (*changes, *crossed)
     draft, moved = strip(draft, limits)
-    changes = (*changes, *moved)
+    draft, sides = strip_sides(draft, limits)
+    changes = (*changes, *moved, *sides)
     return draft, changes
 
 

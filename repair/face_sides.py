@@ -20,9 +20,9 @@ def one_sided(topology: Topology) -> Topology:
     beside: list[list[tuple[int, bool]]] = [[] for _ in topology.loops]
     for some in runs.values():
         if len(some) == 2 and some[0][0] != some[1][0]:
-            (a, one), (b, other) = some
-            beside[a].append((b, one == other))
-            beside[b].append((a, one == other))
+            (a, one), (b, two) = some
+            beside[a].append((b, one == two))
+            beside[b].append((a, one == two))
     turned: dict[int, bool] = {}
     flipped = list(topology.flipped)
     for start in range(len(topology.loops)):

@@ -14,7 +14,7 @@ from enum import Enum
 import numpy as np
 
 from patchwright.models.arrays import Array
-from patchwright.models.boundary_strip import SIDES
+from patchwright.models.boundary_strip import SIDES, border_below
 from patchwright.models.closest_point import closest_on_curve
 from patchwright.models.errors import GeometryError
 from patchwright.models.extension import curve_on
@@ -119,18 +119,8 @@ def _border(surface: Surface, pcurve: NurbsCurve) -> NurbsCurve | None:
     size = box[:, 1] - box[:, 0]
     for side in SIDES:
         k, end = (0 if side[0] == "u" else 1), int(side[1])
-        if max(abs(first[k] - box[k, end]), abs(last[k] - box[k, end])) > FAR * size[k]:
-            continue
-        a, b = float(first[1 - k]), float(last[1 - k])
-        whole = surface.clamped().boundary(side)
-        a, b = (float(np.clip(x, *whole.domain)) for x in (a, b))
-        if a == b:
-            return None
-        part = whole.restricted(min(a, b), max(a, b))
-        part = part.reversed() if a > b else part
-        (s0, s1), (t0, t1) = part.domain, pcurve.domain
-        knots = t0 + (part.knots - s0) * ((t1 - t0) / (s1 - s0))
-        return NurbsCurve(part.degree, knots, part.control_points, part.weights)
+        if max(abs(first[k] - box[k, end]), abs(last[k] - box[k, end])) <= FAR * size[k]:
+            return border_below(surface, side, pcurve)
     return None
 
 

@@ -19,7 +19,7 @@ from itertools import combinations
 import numpy as np
 
 from patchwright.models.arrays import Array
-from patchwright.models.boundary_strip import SIDES, Border, border_space, through, with_borders
+from patchwright.models.boundary_strip import SIDES, Border, border_below, border_space, through, with_borders
 from patchwright.models.cad.editing import compacted, with_loops
 from patchwright.models.errors import GeometryError
 from patchwright.models.extension import surface_on
@@ -72,7 +72,7 @@ def strip(draft: Draft, limits: Limits) -> tuple[Draft, tuple[Change, ...]]:
     if not pairs:
         return draft, ()
     try:
-        return _joined(draft, pairs, places, limits)
+        return _joined(draft, sides, pairs, places, limits)
     except (GeometryError, np.linalg.LinAlgError):
         return draft, ()
 
@@ -150,19 +150,22 @@ def _closed_corners(
 ) -> tuple[list[_Pair], dict[int, Array]]:
     """The pairs whose corners can move, and the new place of each corner.
 
-    A corner may move when every edge at it is on a side that moves; otherwise it stays, and so do its pairs unless
-    their ends are there already.
+    A corner may move when every edge at it is on a side that moves, or on a free side that can follow; otherwise it
+    stays, and so do its pairs unless their ends are there already.
     """
     topology = draft.topology
+    free = {side.edge: side.face for side in sides}
     uses = {use.edge: use for face in range(len(draft.parts)) for use in _uses(draft, face)}
     while pairs:
         moving = {side.edge for pair in pairs for side in (pair.one, pair.two)}
+        faces = {side.face for pair in pairs for side in (pair.one, pair.two)}
+        following = {edge for edge, face in free.items() if face in faces}
         groups = _groups(topology, uses, pairs)
         bad: set[int] = set()
         places: dict[int, Array] = {}
         for group in groups:
             edges = np.flatnonzero(np.isin(topology.ends, sorted(group)).any(axis=1) & (topology.use_counts() > 0))
-            fixed = [int(e) for e in edges if int(e) not in moving]
+            fixed = [int(e) for e in edges if int(e) not in moving | following]
             at = topology.vertices[sorted(group)]
             held = sorted({int(v) for e in fixed for v in topology.ends[e]} & group)
             place = topology.vertices[held[0]] if held else _meeting(draft, group, pairs, uses)
@@ -212,7 +215,7 @@ def _meeting(draft: Draft, group: set[int], pairs: list[_Pair], uses: dict[int, 
 
 
 def _joined(
-    draft: Draft, pairs: list[_Pair], places: dict[int, Array], limits: Limits
+    draft: Draft, sides: list[_Side], pairs: list[_Pair], places: dict[int, Array], limits: Limits
 ) -> tuple[Draft, tuple[Change, ...]]:
     topology = draft.topology
     uses = {use.edge: use for face in range(len(draft.parts)) for use in _uses(draft, face)}
@@ -229,7 +232,7 @@ def _joined(
             target = leader.reversed() if flip else leader
             own = draft.surface(side.face)
             assert isinstance(own, NurbsSurface)
-            depth = DEPTH * pair.gap / _speed(own, side.side)
+            depth = DEPTH * pair.gap / speed_across(own, side.side)
             borders.setdefault(side.face, {})[side.side] = Border(target, depth)
     surfaces: dict[int, Surface] = {}
     for face, wanted in borders.items():
@@ -238,7 +241,7 @@ def _joined(
         raised = _raised(own, wanted)
         fitted = {side: Border(_on_domain(raised, side, b.target, limits), b.depth) for side, b in wanted.items()}
         surfaces[face] = with_borders(raised, fitted)
-    return _topology(draft, pairs, places, surfaces, limits)
+    return _topology(draft, sides, pairs, places, surfaces, limits)
 
 
 def _even(surface: Surface, side: Side) -> NurbsCurve:
@@ -339,7 +342,7 @@ def _across(outward: Array, away: Array) -> Array:
     return np.where(leads, outward / np.where(leads, ahead, 1.0), unit)
 
 
-def _speed(surface: NurbsSurface, side: Side) -> float:
+def speed_across(surface: NurbsSurface, side: Side) -> float:
     """The greatest speed across a border, length per parameter."""
     across, end = (0 if side[0] == "u" else 1), int(side[1])
     box = np.array(surface.domain)
@@ -379,9 +382,14 @@ def _on_domain(surface: NurbsSurface, side: Side, target: NurbsCurve, limits: Li
 
 
 def _topology(
-    draft: Draft, pairs: list[_Pair], places: dict[int, Array], surfaces: dict[int, Surface], limits: Limits
+    draft: Draft,
+    sides: list[_Side],
+    pairs: list[_Pair],
+    places: dict[int, Array],
+    surfaces: dict[int, Surface],
+    limits: Limits,
 ) -> tuple[Draft, tuple[Change, ...]]:
-    """One edge per pair, the first face's border; corners that came together are one."""
+    """One edge per pair, the first face's border; corners that came together are one, and free sides follow them."""
     topology = draft.topology
     curves, vertices = list(topology.curves), topology.vertices.copy()
     for corner, place in places.items():
@@ -400,6 +408,16 @@ def _topology(
             uv = _corners_of(surface, side.side)
             pcurve = NurbsCurve(1, np.array([t0, t0, t1, t1]), uv[::-1] if flip else uv)
             taken[side.edge] = (side.face, EdgeUse(edge, _reversed(draft, side, flip), pcurve))
+    for side in sides:  # those that only follow their corners
+        if side.face in surfaces and side.edge not in taken:
+            follower = surfaces[side.face]
+            assert isinstance(follower, NurbsSurface)
+            use = _use(draft, side)
+            line = use.pcurve if use.pcurve.degree == 1 else straight(use.pcurve)
+            follows = border_below(follower, side.side, line)
+            if follows is not None:
+                curves[side.edge] = follows
+                taken[side.edge] = side.face, replace(use, pcurve=line)
     changed = {}
     for face in surfaces:
         rows = tuple(
@@ -409,6 +427,12 @@ def _topology(
     new = replace(topology, curves=tuple(curves), vertices=vertices, ends=ends)
     mended = draft.with_surfaces(surfaces, compacted(with_loops(new, changed)), same=False)
     return mended, tuple(_change(pair, limits) for pair in pairs)
+
+
+def straight(pcurve: NurbsCurve) -> NurbsCurve:
+    """The straight pcurve between the ends of one along a side."""
+    t0, t1 = pcurve.domain
+    return NurbsCurve(1, np.array([t0, t0, t1, t1]), pcurve.control_points[[0, -1]])
 
 
 def _use(draft: Draft, side: _Side) -> EdgeUse:

@@ -22,7 +22,7 @@ from patchwright.repair.rims import Rim, judge_loops
 CHORDS = 16  # per free edge, at least
 PER_SPAN, MOST_CHORDS = 8, 256  # chords per span of its curve, and at most
 TINY = 4.0  # of the round-off tolerance: a shorter edge lies near its neighbours by being short
-PROBES = 9  # per free edge where its distance from the others is asked
+PROBES = 17  # per free edge where its distance from the others is asked
 
 
 @check("cad-rims", looks="cad", kinds=("open-edge", "gap", "opening", "overlap"))
