@@ -20,6 +20,8 @@ from patchwright.repair._remesh_kernel import (
 )
 from patchwright.repair._surface_walk_kernel import inner, walk
 
+_SOFT = 0.1  # corners much better than this hardly count beside poor ones
+_SLENDER = 4.0  # quads as many times longer than wide are as good as square ones
 _UNPAIRED = 0.55  # score of two triangles left alone: they become six quads as good as those of a pair of this score
 
 
@@ -126,8 +128,12 @@ def place_new(m, g, first, curves, arcs, points, triangles):
 
 
 @inner
-def quad_quality(m, q, quads, outward):
-    """Scaled Jacobian of quad q: the least sine of its corners' angles, seen along the surface normal."""
+def quad_cost(m, q, quads, outward, slender):
+    """(worst, cost) of quad q: its least corner quality and the sum of `_cost` over its corners.
+
+    The quality of a corner is the sine of its angle, seen along the surface normal, times the root of `slender` times
+    the ratio of its two sides where that is below one; an infinite `slender` leaves the angle alone (scaled Jacobian).
+    """
     X, N = m.X, m.N
     a, b, c, d = quads[q, 0], quads[q, 1], quads[q, 2], quads[q, 3]
     ux, uy, uz = X[c, 0] - X[a, 0], X[c, 1] - X[a, 1], X[c, 2] - X[a, 2]
@@ -135,13 +141,13 @@ def quad_quality(m, q, quads, outward):
     nx, ny, nz = uy * wz - uz * wy, uz * wx - ux * wz, ux * wy - uy * wx
     size = np.sqrt(nx * nx + ny * ny + nz * nz)
     if size == 0.0:
-        return -1.0
+        return -1.0, 4.0 * _cost(-1.0)
     nx, ny, nz = nx / size, ny / size, nz / size
     # a turned quad is judged along the surface normal at its centre, so that it can be seen to better
     turned = nx * outward[q, 0] + ny * outward[q, 1] + nz * outward[q, 2] <= 0.0
     if turned:
         nx, ny, nz = outward[q, 0], outward[q, 1], outward[q, 2]
-    worst = 1.0
+    worst, cost = 1.0, 0.0
     for k in range(4):
         p, after, before = quads[q, k], quads[q, (k + 1) % 4], quads[q, (k + 3) % 4]
         ux, uy, uz = X[after, 0] - X[p, 0], X[after, 1] - X[p, 1], X[after, 2] - X[p, 2]
@@ -153,12 +159,32 @@ def quad_quality(m, q, quads, outward):
             length = np.sqrt(px * px + py * py + pz * pz)
             if length > 0.0:
                 px, py, pz = px / length, py / length, pz / length
-        size = np.sqrt((ux * ux + uy * uy + uz * uz) * (wx * wx + wy * wy + wz * wz))
+        u, w = ux * ux + uy * uy + uz * uz, wx * wx + wy * wy + wz * wz
+        size = np.sqrt(u * w)
         if size == 0.0:
-            return -1.0
+            return -1.0, 4.0 * _cost(-1.0)
         j = (px * (uy * wz - uz * wy) + py * (uz * wx - ux * wz) + pz * (ux * wy - uy * wx)) / size
+        if turned:
+            j = min(j, 0.0)
+        if j > 0.0:
+            j *= min(1.0, np.sqrt(slender * min(u, w) / size))
         worst = min(worst, j)
-    return min(worst, 0.0) if turned else worst
+        cost += _cost(j)
+    return worst, cost
+
+
+@inner
+def quad_quality(m, q, quads, outward):
+    """Scaled Jacobian of quad q: the least sine of its corners' angles, seen along the surface normal."""
+    return quad_cost(m, q, quads, outward, np.inf)[0]
+
+
+@inner
+def _cost(quality):
+    """1 / (quality + c)^2, led on straight below zero."""
+    if quality > 0.0:
+        return 1.0 / (quality + _SOFT) ** 2
+    return (1.0 - 2.0 * quality / _SOFT) / _SOFT**2
 
 
 @njit(cache=True, nogil=True, error_model="numpy", _nrt=False, no_cfunc_wrapper=True)
@@ -168,11 +194,14 @@ def all_qualities(m, quads, outward, out):
 
 
 @inner
-def worst_at(m, v, offsets, around, quads, outward):
-    worst = 1.0
+def quality_at(m, v, offsets, around, quads, outward):
+    """(worst, cost) of the quads round v."""
+    worst, cost = 1.0, 0.0
     for a in range(offsets[v], offsets[v + 1]):
-        worst = min(worst, quad_quality(m, around[a], quads, outward))
-    return worst
+        one, own = quad_cost(m, around[a], quads, outward, _SLENDER)
+        worst = min(worst, one)
+        cost += own
+    return worst, cost
 
 
 @inner
@@ -184,9 +213,9 @@ def try_place(m, g, v, x, y, z):
 
 @njit(cache=True, nogil=True, error_model="numpy", _nrt=False, no_cfunc_wrapper=True)
 def smooth_quads(m, g, quads, outward, offsets, around, near_offsets, near, low, high, busy, goal, rounds):
-    """Even out the quads; a vertex moves only when the worst quad round it is not spoilt.
+    """Even out the quads; a vertex moves only to where the quads round it stay good (`goal`) or cost less.
 
-    Round poor quads better places are searched for.
+    Where they are poor, better places are searched for.
 
     `low`, `high` (n,): the vertices before and after on the curve; `near`: edge neighbours; `busy` (n,): those to move.
     """
@@ -195,7 +224,7 @@ def smooth_quads(m, g, quads, outward, offsets, around, near_offsets, near, low,
         for v in range(len(offsets) - 1):
             if kind[v] == 2 or not busy[v]:
                 continue
-            old = worst_at(m, v, offsets, around, quads, outward)
+            old, least = quality_at(m, v, offsets, around, quads, outward)
             ox, oy, oz, os, ot, oh = X[v, 0], X[v, 1], X[v, 2], vs[v], vt[v], H[v]
             onx, ony, onz = N[v, 0], N[v, 1], N[v, 2]
             lo, hi = 0.0, 0.0
@@ -213,14 +242,15 @@ def smooth_quads(m, g, quads, outward, offsets, around, near_offsets, near, low,
                 dx, dy, dz = 0.7 * (x - ox), 0.7 * (y - oy), 0.7 * (z - oz)
                 up = dx * onx + dy * ony + dz * onz
                 try_place(m, g, v, ox + dx - up * onx, oy + dy - up * ony, oz + dz - up * onz)
-            best = worst_at(m, v, offsets, around, quads, outward)
-            if best >= min(old, goal):
+            new, cost = quality_at(m, v, offsets, around, quads, outward)
+            if new >= goal or (cost <= least and new >= min(old, 0.0)):
                 continue
             # back, and search for a better place
             X[v, 0], X[v, 1], X[v, 2] = ox, oy, oz
             N[v, 0], N[v, 1], N[v, 2] = onx, ony, onz
             vs[v], vt[v], H[v] = os, ot, oh
-            best = old
+            if old >= goal:
+                continue
             if kind[v] == 1:
                 step = 0.25 * (hi - lo)
                 for _level in range(5):
@@ -230,9 +260,9 @@ def smooth_quads(m, g, quads, outward, offsets, around, near_offsets, near, low,
                             continue
                         before = vs[v]
                         place_on_curve(m, g, v, vc[v], s)
-                        new = worst_at(m, v, offsets, around, quads, outward)
-                        if new > best:
-                            best = new
+                        new, cost = quality_at(m, v, offsets, around, quads, outward)
+                        if cost < least and new >= min(old, 0.0):
+                            old, least = new, cost
                         else:
                             place_on_curve(m, g, v, vc[v], before)
                     step *= 0.5
@@ -257,9 +287,9 @@ def smooth_quads(m, g, quads, outward, offsets, around, near_offsets, near, low,
                     cx, cy, cz, ct, ch = X[v, 0], X[v, 1], X[v, 2], vt[v], H[v]
                     cnx, cny, cnz = N[v, 0], N[v, 1], N[v, 2]
                     try_place(m, g, v, cx + r * ax + s * bx, cy + r * ay + s * by, cz + r * az + s * bz)
-                    new = worst_at(m, v, offsets, around, quads, outward)
-                    if new > best:
-                        best = new
+                    new, cost = quality_at(m, v, offsets, around, quads, outward)
+                    if cost < least and new >= min(old, 0.0):
+                        old, least = new, cost
                     else:
                         X[v, 0], X[v, 1], X[v, 2] = cx, cy, cz
                         N[v, 0], N[v, 1], N[v, 2] = cnx, cny, cnz

@@ -18,6 +18,9 @@ from patchwright.repair._surface_walk_kernel import inner, walk
 _RING = 512  # most triangles round a vertex; a vertex with more is left alone
 _FACING = 0.34  # cosine of 70 degrees: how far a triangle may turn from the surface's normal at its corners
 _GOOD = 0.25  # quality (1 is equilateral) that is never asked to be bettered
+_SLIM = 0.1  # the same across a strip between curves, where triangles may be long
+_BLUNT = -0.5  # cosine of the largest angle; beyond, a flat triangle lies along its curve
+_ACROSS = 0.5  # of the way along a curve to the next vertex: across narrower strips vertices face each other
 _LENGTHENED = 1.05  # how much a collapse may lengthen an edge that is too long already
 _HALF = 0.8  # longest half of a split edge against the edge
 _APART = 0.02  # of a split edge: where its middle is nearer to a corner opposite, the edge is one to flip
@@ -145,6 +148,25 @@ def distance(m, a, b):
 
 
 @inner
+def spans_strip(m, a, b, c):
+    """Whether a triangle has its corners on different curves, or all on curves and no blunt angle."""
+    kind, vc = m.kind, m.vc
+    if kind[a] == 0 or kind[b] == 0 or kind[c] == 0:
+        return False
+    if kind[a] == 1 and kind[b] == 1 and vc[a] != vc[b]:
+        return True
+    if kind[b] == 1 and kind[c] == 1 and vc[b] != vc[c]:
+        return True
+    if kind[c] == 1 and kind[a] == 1 and vc[c] != vc[a]:
+        return True
+    p, q, r = distance(m, a, b), distance(m, b, c), distance(m, c, a)
+    longest = max(p, max(q, r))
+    one = min(p, q) if longest == r else (min(q, r) if longest == p else min(p, r))
+    two = p + q + r - longest - one
+    return one * one + two * two - longest * longest >= 2.0 * _BLUNT * one * two
+
+
+@inner
 def corner_of(m, t, v):
     T = m.T
     if T[t, 0] == v:
@@ -257,7 +279,10 @@ def collapse_score(m, g, v, w, ring, ring_w, limit):
             if state == 0:
                 worst_old = min(worst_old, value)
             elif state == 1:
-                if value == 0.0 or 0.0 < value < min(_GOOD, worst_old):
+                if value == 0.0:
+                    return _REFUSED
+                good = _SLIM if spans_strip(m, w, p, q) else _GOOD
+                if 0.0 < value < min(good, worst_old):
                     return _REFUSED
                 worst_new = min(worst_new, value)
             else:
@@ -647,6 +672,94 @@ def split_pass(m, g, vertices, triangles, limit):
 
 
 @njit(cache=True, nogil=True, error_model="numpy", no_cfunc_wrapper=True)
+def ladder_pass(m, g, vertices, triangles, limit):
+    """Give both sides of narrow strips as many vertices; (vertices, triangles, changes), the first two in use now.
+
+    A vertex that has but one edge across is dropped, or else the side across gets one more. What is left is a ladder,
+    whose triangles go together in pairs: one alone would be a needle. Stops early when the arrays are full.
+    """
+    kind, T, B, F = m.kind, m.T, m.B, m.F
+    ring = np.empty(_RING, dtype=np.int64)
+    ring_w = np.empty(_RING, dtype=np.int64)
+    starts = np.empty(64, dtype=np.int64)
+    done = 0
+    for v in range(vertices):
+        if m.v2t[v] < 0 or kind[v] != 1:
+            continue
+        before, after = curve_sides(m, g, v)
+        n = ring_of(m, v, ring)
+        if before < 0 or n == 0:
+            continue
+        short = min(distance(m, v, before), distance(m, v, after))
+        one, two, y = -1, -1, -1
+        for i in range(n):
+            t, o = ring[i], ring[(i + 1) % n]
+            k, j = corner_of(m, t, v), corner_of(m, o, v)
+            x, z = T[t, (k + 1) % 3], T[o, (j + 2) % 3]
+            if (
+                not ((x == before and z == after) or (x == after and z == before))
+                or T[o, (j + 1) % 3] != T[t, (k + 2) % 3]
+            ):
+                continue
+            across = T[o, (j + 1) % 3]
+            if kind[across] > 0 and distance(m, v, across) < _ACROSS * short:
+                one, two, y = t, o, across
+        if y < 0:
+            continue
+        to_before = collapse_score(m, g, v, before, ring, ring_w, limit)
+        to_after = collapse_score(m, g, v, after, ring, ring_w, limit)
+        if max(to_before, to_after) > _REFUSED:
+            collapse(m, v, before if to_before >= to_after else after, ring)
+            done += 1
+            continue
+        # the longer of the two edges of the other curve that end in y
+        best, bt, bk = short, -1, 0
+        for side in range(2):
+            t = one if side == 0 else two
+            u = B[t, (corner_of(m, t, v) + 1) % 3]
+            if u < 0:
+                continue
+            k = corner_of(m, u, y)
+            if side == 1:
+                k = (k + 2) % 3
+            other = T[u, (k + 1) % 3] if side == 0 else T[u, k]
+            d = distance(m, y, other)
+            if F[u, k] >= 0 and d > best:
+                best, bt, bk = d, u, k
+        if bt >= 0:
+            if vertices + 1 > len(m.X) or triangles + 2 > len(T):
+                return vertices, triangles, done
+            inside = B[bt, bk] >= 0
+            if split_edge(m, g, bt, bk, vertices, triangles, starts, True):
+                vertices += 1
+                triangles += 2 if inside else 1
+                done += 1
+    return vertices, triangles, done
+
+
+@inner
+def step_to_face(m, v, before, after, ring, n):
+    """(step, width): how far curve vertex v is from facing the nearest vertex of another curve, and what is between.
+
+    `before`, `after` are v's neighbours on its curve, `ring` the n triangles round it; the width is inf without any.
+    """
+    T, X, kind = m.T, m.X, m.kind
+    near, step = np.inf, 0.0
+    tx, ty, tz = X[after, 0] - X[before, 0], X[after, 1] - X[before, 1], X[after, 2] - X[before, 2]
+    size = np.sqrt(tx * tx + ty * ty + tz * tz)
+    for i in range(n):
+        for k in range(3):
+            x = T[ring[i], k]
+            if x != v and x != before and x != after and kind[x] > 0:
+                d = distance(m, v, x)
+                if d < near and size > 0.0:
+                    near = d
+                    step = (X[x, 0] - X[v, 0]) * tx + (X[x, 1] - X[v, 1]) * ty + (X[x, 2] - X[v, 2]) * tz
+                    step /= size
+    return step, np.sqrt(max(near * near - step * step, 0.0)) if near < np.inf else near
+
+
+@njit(cache=True, nogil=True, error_model="numpy", no_cfunc_wrapper=True)
 def smooth_pass(m, g, vertices, relax):
     """Move smooth vertices to the mean of their triangles' centres, curve vertices to even spacing; how many."""
     kind, T, R, X, H, vt, vs, N = m.kind, m.T, m.R, m.X, m.H, m.vt, m.vs, m.N
@@ -665,6 +778,7 @@ def smooth_pass(m, g, vertices, relax):
             old = min(old, quality(m, g, T[t, 0], T[t, 1], T[t, 2], R[t], np.int64(1)))
         ox, oy, oz, oh, ot, os = X[v, 0], X[v, 1], X[v, 2], H[v], vt[v], vs[v]
         onx, ony, onz = N[v, 0], N[v, 1], N[v, 2]
+        good = _GOOD
         if kind[v] == 1:
             before, after = curve_sides(m, g, v)
             if before < 0:
@@ -674,7 +788,12 @@ def smooth_pass(m, g, vertices, relax):
             if low >= high:
                 continue
             left, right = 0.5 * (H[before] + oh), 0.5 * (H[after] + oh)
-            place_on_curve(m, g, v, c, os + relax * (low + (high - low) * left / (left + right) - os))
+            s = low + (high - low) * left / (left + right)
+            step, width = step_to_face(m, v, before, after, ring, n)
+            if width < _ACROSS * min(os - low, high - os):
+                s = 0.3 * s + 0.7 * min(max(os + step, 0.8 * low + 0.2 * high), 0.2 * low + 0.8 * high)
+                good = 0.6 * old  # right angles make longer triangles than even spacing
+            place_on_curve(m, g, v, c, os + relax * (s - os))
         else:
             total, x, y, z = 0.0, 0.0, 0.0, 0.0
             for i in range(n):
@@ -700,7 +819,7 @@ def smooth_pass(m, g, vertices, relax):
         for i in range(n):
             t = ring[i]
             new = min(new, quality(m, g, T[t, 0], T[t, 1], T[t, 2], R[t], np.int64(1)))
-        if new < min(old, _GOOD):
+        if new < min(old, good):
             X[v, 0], X[v, 1], X[v, 2] = ox, oy, oz
             N[v, 0], N[v, 1], N[v, 2] = onx, ony, onz
             H[v], vt[v], vs[v] = oh, ot, os

@@ -11,8 +11,8 @@ from patchwright.models.arrays import Array, BoolArray, IntArray
 from patchwright.models.triangulation import Triangulation
 
 CORNER_TURN = 40.0  # degrees a feature line turns at a corner
-SPECK_EDGES = 5  # a line of fewer edges and shorter than SPECK_SHARE is noise unless both its ends are attached
-SPECK_SHARE = 0.01  # of the diagonal
+SPECK_SHARE = 0.01  # of the diagonal: a shorter line with a loose end fades away and is let go
+SPECK_EDGES = 5  # a ring as short is noise when it has fewer edges or is shorter than half of that
 ROUNDS = 4  # of cutting teeth and joining specks: what is left after that is no chain of slivers
 
 
@@ -35,8 +35,8 @@ def not_specks(edges: IntArray, feature: BoolArray, firm: BoolArray, length: Arr
         begin, finish = vertices[rows], vertices[rows + pieces]
         loose = (degree[begin] == 1) | (degree[finish] == 1)
         ring = (begin == finish) & (degree[begin] == 2)
-        short = (size < SPECK_SHARE * diagonal) & ((pieces < SPECK_EDGES) | (size < 0.5 * SPECK_SHARE * diagonal))
-        poor = short & (loose | ring)
+        short = size < SPECK_SHARE * diagonal
+        poor = short & (loose | (ring & ((pieces < SPECK_EDGES) | (size < 0.5 * SPECK_SHARE * diagonal))))
         drop = picked[poor[chain]]
         drop = drop[~firm[drop]]
         if not len(drop):

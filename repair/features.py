@@ -27,6 +27,7 @@ from patchwright.repair.feature_cleaning import (
 
 HYSTERESIS = 0.6  # of the angle: how far a sharp line may fade
 SLIT = 1e-3  # of the diagonal, a quarter of the smallest quad: lines between the same ends that are nearer are one
+SPECK = 2e-3  # of the diagonal, half of the smallest quad: smaller pieces between lines are no pieces of their own
 NOISY_HEIGHT = 20.0  # times the noise: a lower triangle's own normal is off by degrees
 NEEDLE_HEIGHT = 6.0  # times the noise: a lower triangle has no normal of its own
 FOLLOWED, SHARP, BOUNDARY = 1, 2, 3  # kinds of curves: only followed, sharp, boundary
@@ -123,7 +124,8 @@ def find_features(triangulation: Triangulation, *, angle: float = 30.0, frozen: 
         sharp &= not_slits(edges, sharp | firm, firm, length, cosine, points, width)
         sharp &= not_specks(edges, sharp | firm, firm, length, body.diagonal)
     cut_teeth(body, neighbours, normals, edges, sides, sharp, firm, length, width)
-    if merge_specks(body, neighbours, normals, sides, sharp, firm, length, width**2, np.cos(np.radians(angle))):
+    least = max(width, SPECK * body.diagonal) ** 2
+    if merge_specks(body, neighbours, normals, sides, sharp, firm, length, least, np.cos(np.radians(angle))):
         sharp &= not_specks(edges, sharp | firm, firm, length, body.diagonal)
     kind = np.where(free, BOUNDARY, np.where(sharp, SHARP, np.where(follow, FOLLOWED, 0)))
     return _chains(body, neighbours, normals, noise, edges, sides, kind, first, second, width)

@@ -17,7 +17,8 @@ LARGEST, SMALLEST = 0.15, 0.004  # of the diagonal: quads
 RIDGE_SIZE = 12.0  # radii of the bend: quads that begin at a ridge; sixteen pieces then follow the bend within r / 1000
 GRADING = 0.45  # growth of the size per length
 STRIP_ASPECT = 3.0  # longest quad in a strip between features against the strip's width
-MOST_QUADS = 1500  # where no number is asked for
+MOST_QUADS = 1500  # where no number is asked for, besides those that features ask for
+MOST_FEATURED = 4500  # quads that features may ask for: bends, lengths and strips of curves alone
 AREA_PER_QUAD = 0.85  # mean area of a quad against its size squared, measured on graded layouts
 
 
@@ -29,7 +30,8 @@ def size_field(
     Parameters
     ----------
     ridges : ridge lines of the same triangulation, followed by `features`; None for none
-    target : wanted number of quads, None for what the shape asks for (at most MOST_QUADS)
+    target : wanted number of quads, None for what the shape asks for (at most MOST_QUADS, and besides as many as the
+        feature curves alone ask for, at most MOST_FEATURED)
     factor : further scale of the sizes, to correct the number that came out
     """
     body = features.body
@@ -47,7 +49,11 @@ def size_field(
     graded = _grade(features, size)
     number = _count(features, graded)
     if target is None and number > MOST_QUADS:
-        target = MOST_QUADS
+        alone = np.full(len(size), LARGEST * diagonal)
+        np.minimum.at(alone, on_curve, limit)
+        featured = _count(features, _grade(features, np.maximum(alone, SMALLEST * diagonal)))
+        most = MOST_QUADS + min(featured, MOST_FEATURED)
+        target = round(most) if number > most else None
     if target is not None:
         for _ in range(4):
             scale = np.sqrt(number / target)
