@@ -81,8 +81,14 @@ class Triangulation:
     @property
     def area_vectors(self) -> Array:
         """(m, 3) normals whose length is the triangle's area."""
-        a, b, c = np.moveaxis(self.corners, 1, 0)
-        return 0.5 * np.cross(b - a, c - a)
+        corners = self.corners
+        u, v = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+        vectors = np.empty_like(u)
+        for k in range(3):
+            i, j = (k + 1) % 3, (k + 2) % 3
+            vectors[:, k] = u[:, i] * v[:, j] - u[:, j] * v[:, i]
+        vectors *= 0.5
+        return vectors
 
     @property
     def areas(self) -> Array:

@@ -85,26 +85,39 @@ def edge_candidates(
         cells[level == NOWHERE] = 0.0
         corner = np.floor(middle / sizes[:, :1] - 0.5)
         corner[level == NOWHERE] = 0.0
-    keys, items = np.empty(2 * n, dtype=np.int64), np.empty(2 * n, dtype=np.int64)
+    keys, items = np.empty((2, 2 * n), dtype=np.int64), np.empty(2 * n, dtype=np.int64)
     offsets = np.zeros(_slots(n) + 2, dtype=np.int64)
-    _sort_cells(levels.reshape(-1), cells.reshape(-1, 3).astype(np.int64), keys, offsets, items)
-    _edge_candidates(a, b, apex, tag, reach, level, corner.astype(np.int64), keys, offsets, items, partner, gap, kind)
+    places = np.empty((2 * n, 3))
+    _sort_cells(levels.reshape(-1), cells.reshape(-1, 3).astype(np.int64), middle, keys, offsets, items, places)
+    _edge_candidates(
+        a, b, apex, tag, reach, level, corner.astype(np.int64), middle, keys[1], offsets, items, places, partner, gap,
+        kind,
+    )  # fmt: skip
     return partner, gap, kind
 
 
 @filling
-def _sort_cells(levels: IntArray, cells: IntArray, keys: IntArray, offsets: IntArray, items: IntArray) -> None:
-    """Counting sort of the cells by the hash of their keys: those of slot s are items[offsets[s]:offsets[s + 1]]."""
+def _sort_cells(
+    levels: IntArray, cells: IntArray, middle: Array, keys: IntArray, offsets: IntArray, items: IntArray, places: Array
+) -> None:
+    """Counting sort of the cells by the hash of their keys: those of slot s are items[offsets[s]:offsets[s + 1]].
+
+    `keys[1]` and `places`, the edges' middles, stand in the order of the items: what is read together lies together.
+    """
     slots = len(offsets) - 2
     for i in range(len(levels)):
-        keys[i] = _cell(levels[i], cells[i, 0], cells[i, 1], cells[i, 2])
-        offsets[(_mix(keys[i]) & (slots - 1)) + 2] += 1
+        keys[0, i] = _cell(levels[i], cells[i, 0], cells[i, 1], cells[i, 2])
+        offsets[(_mix(keys[0, i]) & (slots - 1)) + 2] += 1
     for s in range(slots):
         offsets[s + 2] += offsets[s + 1]
     for i in range(len(levels)):
-        s = (_mix(keys[i]) & (slots - 1)) + 1
-        items[offsets[s]] = i
-        offsets[s] += 1
+        s = (_mix(keys[0, i]) & (slots - 1)) + 1
+        at = offsets[s]
+        items[at] = i
+        keys[1, at] = keys[0, i]
+        for d in range(3):
+            places[at, d] = middle[i >> 1, d]
+        offsets[s] = at + 1
 
 
 @filling
@@ -116,9 +129,11 @@ def _edge_candidates(
     reach: Array,
     level: IntArray,
     first_cell: IntArray,
+    middle: Array,
     keys: IntArray,
     offsets: IntArray,
     items: IntArray,
+    places: Array,
     partner: IntArray,
     gap: Array,
     kind: IntArray,
@@ -137,7 +152,13 @@ def _edge_candidates(
             )
             s = _mix(key) & (slots - 1)
             for at in range(offsets[s], offsets[s + 1]):
-                if keys[items[at]] != key:
+                if keys[at] != key:
+                    continue
+                # middles are no farther apart than the farther pair of ends; the factor is for rounding
+                far = 0.0
+                for d in range(3):
+                    far += (middle[e, d] - places[at, d]) * (middle[e, d] - places[at, d])
+                if far > 1.0001 * reach[e] * reach[e]:
                     continue
                 f = items[at] >> 1
                 if f == e:
