@@ -17,7 +17,7 @@ import numpy as np
 from patchwright.models.arrays import Array
 from patchwright.models.cad.connectivity import is_point
 from patchwright.models.cad.editing import Loops, with_loops
-from patchwright.models.cad.seams import measure_seams
+from patchwright.models.cad.seams import carried_on, edge_deviation, measure_seams
 from patchwright.models.knots import divided
 from patchwright.models.nurbs_curve import NurbsCurve
 from patchwright.models.nurbs_surface import NurbsSurface
@@ -58,14 +58,14 @@ def retrace(
 ) -> tuple[Draft, tuple[Change, ...], tuple[Attempt, ...]]:
     """The draft with better pcurves where they stray from their edges, what changed, and where they would turn a loop.
 
-    Looked at are the edges whose two surfaces are farther apart than a closed seam, the free edges, and all edges of
-    `faces`.
+    Looked at are the edges whose two surfaces are farther apart than a closed seam, those whose pcurves stray as far
+    from them, the free edges, and all edges of `faces`.
     """
     topology = draft.topology
     wide = 2.0 * limits.on
     bare = replace(draft.assembly, topology=topology, native=None)
     asked = {seam.edge for seam in measure_seams(bare) if seam.gap > wide}
-    asked |= set(np.flatnonzero(topology.use_counts() == 1).tolist())
+    asked |= set(np.flatnonzero((topology.use_counts() == 1) | (edge_deviation(bare) > wide)).tolist())
     loops: dict[int, Loops] = {}
     surfaces: dict[int, Surface] = {}
     changes: list[Change] = []
@@ -259,9 +259,11 @@ def _inside(pcurve: NurbsCurve, surface: Surface) -> NurbsCurve:
 
 
 def _image(surface: Surface, pcurve: NurbsCurve, t: Array) -> Array:
-    low, high = np.array(surface.domain).T
-    u, v = np.clip(pcurve(t), low, high).T
-    return surface(u, v)
+    """(k, 3) the pcurve's points as the kernel takes them, which goes on beyond a surface's borders."""
+    uv = pcurve(t)
+    wide = carried_on(surface, uv)
+    u, v = np.clip(uv, *np.array(wide.domain).T).T
+    return wide(u, v)
 
 
 def _change(draft: Draft, face: int, count: int, worst: float, moved: float, limits: Limits) -> Change:

@@ -124,7 +124,7 @@ def edge_deviation(assembly: Assembly, samples: int = _PROBES) -> Array:
 
 def _deviation(assembly: Assembly, topology: Topology, uses: IntArray, samples: int) -> Array:
     """(e,) of `edge_deviation` at equally spaced samples of some uses, zero for the edges of no such use."""
-    points, _, _ = _on_surfaces(assembly, topology, uses, samples, with_normals=False, carried_on=True)
+    points, _, _ = _on_surfaces(assembly, topology, uses, samples, with_normals=False, beyond_borders=True)
     edges, place = np.unique(uses[:, 0], return_inverse=True)
     curves = np.stack([_sampled(topology.curves[int(edge)], samples) for edge in edges])
     out = np.zeros(len(topology.curves))
@@ -161,7 +161,7 @@ def _sampled(curve: NurbsCurve, samples: int) -> Array:
 
 def _on_surfaces(
     assembly: Assembly, topology: Topology, uses: IntArray, samples: int, *, with_normals: bool,
-    carried_on: bool = False,
+    beyond_borders: bool = False,
 ) -> tuple[Array, Array, Array]:  # fmt: skip
     """Points and outward unit normals (k, samples, 3) of every use on its face's surface, and `beyond` (k,).
 
@@ -177,8 +177,8 @@ def _on_surfaces(
         uv = np.stack([_sampled(topology.loops[face][n][p].pcurve, samples) for _, _, n, p in uses[low:high]])
         bottom, top = np.array(surface.domain, dtype=np.float64).T
         inside = np.clip(uv, bottom, top)
-        if carried_on and not np.array_equal(inside, uv):
-            surface = _carried_on(surface, uv)
+        if beyond_borders and not np.array_equal(inside, uv):
+            surface = carried_on(surface, uv)
             inside = np.clip(uv, *np.array(surface.domain, dtype=np.float64).T)
         size = np.where(np.isfinite(top - bottom), top - bottom, 1.0)
         beyond[low:high] = (np.abs(inside - uv) / size).max(axis=(1, 2))
@@ -193,7 +193,7 @@ def _on_surfaces(
     return points, normals, beyond
 
 
-def _carried_on(surface: Surface, uv: Array) -> Surface:
+def carried_on(surface: Surface, uv: Array) -> Surface:
     """The surface on ranges that hold all of `uv` (..., 2); as it is where it cannot be carried on so far."""
     low, high = np.array(surface.domain, dtype=np.float64).T
     least, most = uv.reshape(-1, 2).min(axis=0), uv.reshape(-1, 2).max(axis=0)
