@@ -6,7 +6,7 @@ topology of Catmull-Clark's first step). Pairs are never joined across a feature
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -38,6 +38,12 @@ class QuadMesh:
     outward: Array
     sides: IntArray
     side_curve: IntArray
+
+    def copy(self) -> QuadMesh:
+        """The same quads with vertices and normals of their own, to be moved apart from these."""
+        mesh = self.mesh
+        columns = {name: values.copy() for name, values in zip(mesh._fields[:8], mesh[:8], strict=True)}
+        return replace(self, mesh=mesh._replace(**columns), outward=self.outward.copy())
 
 
 def pair_score(coarse: CoarseMesh) -> Array:

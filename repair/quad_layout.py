@@ -1,7 +1,7 @@
 """`QuadLayout`: quads over a triangulation, each to become one patch, with the path every edge takes on the surface.
 
 `quad_layout` finds one: features and sizes of the triangulation, coarse triangles along the features, pairs of them
-made quads, all split once into quads only, then smoothed.
+made quads, all split once into quads only, made regular, then smoothed.
 """
 
 from __future__ import annotations
@@ -176,25 +176,31 @@ def _with_ridges(features: Features, angle: float) -> tuple[Features, Ridges | N
 
 
 def _pairs(features: Features, ridges: Ridges | None, target: int | None) -> QuadMesh:
-    """Coarse triangles paired and split; once more with corrected sizes where the number of quads is off."""
+    """Coarse triangles paired, split and made regular; once more with corrected sizes where their number is off."""
     from patchwright.repair.pairing import pair
-    from patchwright.repair.quad_smooth import smooth
+    from patchwright.repair.quad_smooth import scaled_jacobians, smooth
+    from patchwright.repair.regular import regularize, unfolded
     from patchwright.repair.remesh import remesh
     from patchwright.repair.sizing import size_field
 
     factor, best, error = 1.0, None, np.inf
     for _ in range(RETRIES):
         size, wanted = size_field(features, ridges, target=target, factor=factor)
-        quad_mesh = pair(remesh(features, 2.0 * size))
+        paired = pair(remesh(features, 2.0 * size))
+        smoothed = paired.copy()
+        smooth(smoothed)
+        quad_mesh = regularize(unfolded(paired, smoothed))
         ratio = len(quad_mesh.quads) / wanted
         if abs(np.log(ratio)) < error:
-            best, error = quad_mesh, abs(np.log(ratio))
+            best, error = (quad_mesh, smoothed), abs(np.log(ratio))
         if target is None or error < np.log(NEAR_TARGET):
             break
         factor *= np.sqrt(ratio)
     assert best is not None
-    smooth(best)
-    return best
+    regular, smoothed = best
+    smooth(regular)
+    # never more folds than the quads as they were paired
+    return min((regular, smoothed), key=lambda mesh: int((scaled_jacobians(mesh) <= 0.0).sum()))
 
 
 def _finish(quad_mesh: QuadMesh, features: Features, begin: float) -> QuadLayout:
