@@ -15,9 +15,7 @@ import numpy as np
 from patchwright.models.arrays import Array
 from patchwright.models.cad.connectivity import is_point
 from patchwright.models.cad.editing import compacted, with_loops
-from patchwright.models.knots import divided
 from patchwright.models.nurbs_curve import NurbsCurve
-from patchwright.models.nurbs_surface import NurbsSurface
 from patchwright.models.surface import Surface
 from patchwright.models.topology import EdgeUse
 from patchwright.repair.cad_draft import Change, Draft, Limits
@@ -25,15 +23,13 @@ from patchwright.repair.face_sides import one_sided
 from patchwright.repair.loop_shape import in_step, simple
 from patchwright.repair.pcurves import below
 from patchwright.repair.result import Rung
-from patchwright.repair.seam_curves import Judged, Meeting, common, judged, reattached, track, uses_of
+from patchwright.repair.seam_curves import Judged, Meeting, common, inside, judged, reattached, track, uses_of
 from patchwright.repair.seam_nodes import Nodes, placed
 from patchwright.repair.seam_pieces import Cut, Piece, cut, seams
 
 FINE = (1e-6, 1e-5, 1e-4)  # of the diagonal: reaches at which a file's own precision may have left its edges
 COARSE = (3e-4, 1e-3)  # of the diagonal: reaches beyond it, tried after displaced faces have been put back
 TIGHT = 10.0  # of the rungs' finest length: how near a new pcurve follows its edge
-PROBES = 8  # per span of a pcurve, where it may leave its surface
-BEYOND = 1e-9  # of a domain: what a pcurve may leave it by
 ROUNDS = 8  # times a reach is tried again with the seams left out that do not hold
 
 
@@ -133,7 +129,7 @@ def _join(draft: Draft, one: Judged, nodes: Nodes, uses: dict[int, EdgeUse], wor
         return False
     first, own = others[0], uses[lead.edge].pcurve
     near = {first.face: uses[first.edge].pcurve(np.array([first.t1 if against else first.t0]))[0]}
-    kept = curve is one.track and _inside(draft.surface(lead.face), own)
+    kept = curve is one.track and inside(draft.surface(lead.face), own)
     if not kept:
         near[lead.face] = own(np.array([lead.t0]))[0]
     pcurves = _below(draft, curve, near, work, limits)
@@ -145,15 +141,6 @@ def _join(draft: Draft, one: Judged, nodes: Nodes, uses: dict[int, EdgeUse], wor
     edge = _Edge(curve, (nodes.corner[lead.start], nodes.corner[lead.end]), pcurves)
     work.add(edge, (lead.edge, lead.t0, False), *((p.edge, p.t0, against) for p in others))
     return True
-
-
-def _inside(surface: Surface, pcurve: NurbsCurve) -> bool:
-    """Whether a pcurve stays in the domain of a NURBS; beyond it kernels carry the surface on, each in its own way."""
-    if not isinstance(surface, NurbsSurface):
-        return True
-    box = np.array(surface.domain)
-    uv = pcurve(divided(pcurve.breaks, PROBES))
-    return bool((np.abs(np.clip(uv, box[:, 0], box[:, 1]) - uv) <= BEYOND * (box[:, 1] - box[:, 0])).all())
 
 
 def _below(

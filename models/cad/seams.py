@@ -19,6 +19,7 @@ from patchwright.models.topology import Topology
 
 _PROBES = 33  # samples per edge where only its deviation is asked
 _RESOLUTION = 1e-7  # of the kernel (Precision::Confusion): no tolerance is smaller
+_SUSPECT = 0.01  # of the resolution: an edge that deviates more may exceed it between two samples
 _BETWEEN = 0.05  # of a deviation: what may lie between two samples
 
 
@@ -108,15 +109,15 @@ def measure_seams(assembly: Assembly, samples: int = 24) -> list[Seam]:
 def edge_deviation(assembly: Assembly, samples: int = _PROBES) -> Array:
     """(e,) largest distance of each edge's 3-D curve from its pcurves on their surfaces; empty without topology.
 
-    Edges that deviate by more than the kernel's resolution are sampled again five times as densely, and get a
-    twentieth more for what lies between the samples: a tolerance that is too small makes a face invalid.
+    Edges that deviate by more than a hundredth of the kernel's resolution are sampled again five times as densely, and
+    get a twentieth more for what lies between the samples: a tolerance that is too small makes a face invalid.
     """
     topology = assembly.topology
     if topology is None or not topology.curves:
         return np.zeros(0)
     uses = edge_uses(topology)
     off = _deviation(assembly, topology, uses, samples)
-    again = uses[off[uses[:, 0]] > _RESOLUTION]
+    again = uses[off[uses[:, 0]] > _SUSPECT * _RESOLUTION]
     if len(again):
         off = np.maximum(off, (1.0 + _BETWEEN) * _deviation(assembly, topology, again, 5 * (samples - 1) + 1))
     return off
