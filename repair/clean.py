@@ -71,6 +71,32 @@ def drop_duplicates(triangulation: Triangulation) -> Cleaned:
     return _keep(triangulation, keep)
 
 
+def drop_hanging_flats(triangulation: Triangulation, height: float) -> Cleaned:
+    """Without triangles of no area that only hang on the surface.
+
+    A flat triangle that fills a T-junction has two neighbours at every edge and stays; one that hangs on an edge of two
+    others, or ends free on two sides, bounds nothing.
+
+    Parameters
+    ----------
+    height : up to this a triangle counts as flat, a length
+    """
+    current, parents = triangulation, np.arange(len(triangulation))
+    while len(current):
+        corners = current.corners
+        longest = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2).max(axis=1)
+        flat = 2.0 * current.areas <= height * longest
+        if not flat.any():
+            break
+        adjacency = Adjacency.of(current)
+        sides = adjacency.triangle_edges
+        flat &= adjacency.non_manifold[sides].any(axis=1) | (adjacency.free[sides].sum(axis=1) >= 2)
+        if not flat.any():
+            break
+        current, parents = current.take(~flat), parents[~flat]
+    return Cleaned(current, parents, np.setdiff1d(np.arange(len(triangulation)), parents))
+
+
 def split_non_manifold(triangulation: Triangulation, *, vertices: bool = True) -> Triangulation:
     """The same triangles with own vertices where too many meet.
 

@@ -7,9 +7,10 @@ import numpy as np
 from patchwright.models.adjacency import Adjacency
 from patchwright.models.arrays import Array
 from patchwright.models.triangulation import Triangulation
-from patchwright.repair.clean import drop_collapsed, drop_duplicates, split_non_manifold
+from patchwright.repair.clean import drop_collapsed, drop_duplicates, drop_hanging_flats, split_non_manifold
 from patchwright.repair.conform import conform
 from patchwright.repair.mended import Action, Work, middle
+from patchwright.repair.near_copies import near_copies
 from patchwright.repair.orient import orient
 from patchwright.repair.weld import Copies, contract_short, reach_of, weld, weld_distance
 
@@ -17,6 +18,9 @@ from patchwright.repair.weld import Copies, contract_short, reach_of, weld, weld
 def weld_copies(work: Work) -> None:
     copies = Copies.of(work.now, reach_of(work.tolerance))
     distance, reason = weld_distance(work.now, work.tolerance, copies)
+    work.now, doubled = near_copies(work.now, distance)
+    if len(doubled):
+        copies = Copies.of(work.now, reach_of(work.tolerance))
     welded = weld(work.now, distance, copies)
     del copies
     work.noise, work.distance = welded.noise, distance
@@ -60,6 +64,9 @@ def clean(work: Work) -> None:
     work.drop("collapsed triangles", "two of their corners are one point", cleaned.removed)
     work.follow(cleaned.triangulation, cleaned.parents)
     _undouble(work)
+    cleaned = drop_hanging_flats(work.now, work.tolerance.gap)
+    work.drop("flat triangles", "without area, hanging on an edge of two others", cleaned.removed)
+    work.follow(cleaned.triangulation, cleaned.parents)
 
 
 def _undouble(work: Work) -> None:
