@@ -19,6 +19,7 @@ REACH_SHARE = 0.05  # of the diagonal: rims farther apart than this are no seam 
 RIM_SHARE = 0.5  # of a rim's own diagonal: a gap as wide as this is an opening
 ON_SHARE = 5e-7  # of the diagonal: an edge this near a surface lies on it; half of the widest seam that is closed
 LOOSE_SHARE = 1e-4  # of the diagonal: a shared edge whose surfaces are farther apart is taken apart
+FEWEST = 20.0  # seconds that a call of the kernel is given when it is begun at all
 SECONDS = 150.0  # after which the rungs begin nothing new
 FIT_SHARE = 1e-10  # of the diagonal: how near new edges and pcurves follow what they stand for
 
@@ -44,6 +45,10 @@ class Limits:
     def expired(self) -> bool:
         """Whether the time is up."""
         return time.monotonic() > self.until
+
+    def left(self, at_most: float) -> float:
+        """Seconds left for one call of the kernel, no more than a limit of its own, no fewer than it needs at all."""
+        return max(min(at_most, self.until - time.monotonic()), min(FEWEST, at_most))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -17,6 +17,7 @@ from patchwright.models.cad.status import brep_status
 from patchwright.models.errors import EngineError
 from patchwright.repair.cad_draft import Attempt, Change, Draft, Limits
 from patchwright.repair.face_steps import built, folds, in_vain, mended_faces, widest
+from patchwright.repair.free_edges import on_own_surfaces
 from patchwright.repair.loose_seams import opened
 from patchwright.repair.realign import realign
 from patchwright.repair.retrim import retrim
@@ -70,9 +71,10 @@ def _brought_together(model: Assembly, limits: Limits) -> tuple[Assembly, tuple[
         if len(changes) in tried:
             continue
         tried.add(len(changes))
+        mended, drawn = on_own_surfaces(mended, limits)
         made = _closed(model, mended, limits, max(2.0 * limits.on, gap))
         if made is not None:
-            return made, changes, (), apart
+            return made, (*changes, *drawn), (), apart
         failed = in_vain("faces brought together", changes, "its seams gape or its faces fold or became invalid")
     return model, (), failed, 0
 
@@ -106,7 +108,7 @@ def _closed(model: Assembly, draft: Draft, limits: Limits, gap: float) -> Assemb
 
     It holds when no seam is wider than `gap`, no face lies on another, and no face has become invalid.
     """
-    made = built(model, draft)
+    made = built(model, draft, limits)
     if made is None:
         return None
     try:

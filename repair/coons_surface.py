@@ -73,6 +73,6 @@ def _raised(surface: NurbsSurface, along_u: NurbsCurve, along_v: NurbsCurve) -> 
     (p, q), (r, s) = surface.degree, (along_u.degree, along_v.degree)
     if p < r or q < s:
         surface = surface.elevated(r - p, s - q)
-    new_u = [] if p == r and len(surface.knots[0]) == len(along_u.knots) else along_u.knots[r + 1 : -r - 1]
-    new_v = [] if q == s and len(surface.knots[1]) == len(along_v.knots) else along_v.knots[s + 1 : -s - 1]
+    new_u = along_u.knots[r + 1 : -r - 1] if len(surface.knots[0]) < len(along_u.knots) else along_u.knots[:0]
+    new_v = along_v.knots[s + 1 : -s - 1] if len(surface.knots[1]) < len(along_v.knots) else along_v.knots[:0]
     return surface.insert_knots(new_u, new_v).control_points.copy()

@@ -12,7 +12,8 @@ from patchwright.repair.fingerprint import Fingerprint, fingerprint, matched
 from patchwright.repair.surroundings import Surroundings
 
 CAPPED = "opening capped by a plane"
-OPTIONAL = ("bridge", "close", "stray triangles", CAPPED)
+FILLED = "opening filled by a new surface"
+OPTIONAL = ("bridge", "close", "stray triangles", CAPPED, FILLED)
 """kinds of change that can be rejected: nothing later stands on them, so what they would mend just stays as it is"""
 
 

@@ -21,6 +21,7 @@ from patchwright.repair.retrace import retrace
 from patchwright.repair.tiny_edges import without_tiny_edges
 from patchwright.repair.turned_loops import turned_loops
 
+CHECK, BUILD = 60.0, 120.0  # seconds for the kernel's check of all faces and for building them, where the time is left
 AGAIN = 3  # rounds in which faces that became invalid get back what they had
 FOLD = 179.0  # degrees between outward normals: two faces that lie on each other
 
@@ -48,19 +49,21 @@ def mended_faces(model: Assembly, limits: Limits) -> tuple[Assembly, Changes, At
     """The model with its bad faces mended as far as the steps reach, what was done, and what was tried in vain."""
     changes: Changes = ()
     failed: Attempts = ()
-    bad = bad_faces(model)
+    bad = bad_faces(model, limits)
     for what, step in STEPS:
         if limits.expired:
+            start = Draft(model, model.topology) if model.topology is not None else None
+            failed += tuple(Attempt(what, (f,), "the time was up", start.middle(f)) for f in sorted(bad) if start)
             break
         model, bad, done, missed = _stepped(model, bad, limits, what, step)
         changes, failed = (*changes, *done), (*failed, *missed)
     return model, changes, failed
 
 
-def bad_faces(model: Assembly) -> set[int]:
+def bad_faces(model: Assembly, limits: Limits) -> set[int]:
     """Faces the kernel calls invalid or cannot tessellate."""
     bare = {i for i, part in enumerate(model.parts) if not len(part.triangulation)}
-    return bare | set(brep_status(model).invalid)
+    return bare | set(brep_status(model, time_limit=limits.left(CHECK)).invalid)
 
 
 def widest(model: Assembly) -> float:
@@ -73,10 +76,10 @@ def folds(model: Assembly) -> int:
     return sum(seam.typical >= FOLD for seam in measure_seams(model))
 
 
-def built(model: Assembly, draft: Draft) -> Assembly | None:
+def built(model: Assembly, draft: Draft, limits: Limits) -> Assembly | None:
     """The draft as the kernel builds it; None where it cannot."""
     try:
-        return rebuilt(model, draft.parts, compacted(draft.topology))
+        return rebuilt(model, draft.parts, compacted(draft.topology), time_limit=limits.left(BUILD + len(draft.parts)))
     except EngineError:
         return None
 
@@ -98,15 +101,15 @@ def _stepped(
     for _ in range(AGAIN):
         if not changes:
             break
-        made = built(model, draft)
+        made = built(model, draft, limits)
         if made is None:
             return model, bad, (), (*failed, *in_vain(what, changes, "the CAD kernel cannot build it"))
-        now = bad_faces(made)
+        now = bad_faces(made, limits)
         worse = now - bad
         if worse and not plain:  # what the kernel makes of the model as it was: its triangles may be from elsewhere
             plain = True
-            as_it_was = built(model, start)
-            bad = bad | (bad_faces(as_it_was) if as_it_was is not None else set())
+            as_it_was = built(model, start, limits)
+            bad = bad | (bad_faces(as_it_was, limits) if as_it_was is not None else set())
             worse = now - bad
         if not worse:
             if widest(made) > max(widest(model), 2.0 * limits.on) or folds(made) > folds(model):

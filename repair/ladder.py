@@ -20,6 +20,7 @@ from patchwright.repair.surroundings import Surroundings, surroundings
 
 SCOPES = ("least", "all")
 OPENINGS = ("keep", "close")
+SECONDS = 600.0  # default time limit for CAD faces that are kept
 
 
 def repair(
@@ -32,6 +33,7 @@ def repair(
     domain: Domain | None = None,
     plan: Plan | None = None,
     diagnosis: Diagnosis | None = None,
+    time_limit: float = SECONDS,
     progress: Progress | None = None,
 ) -> Repaired:
     """Mend a model with the least change.
@@ -46,6 +48,8 @@ def repair(
     domain : the flow domain round the body; what it does not say is guessed
     plan : a reviewed plan: its rejected items are left out, and what does not fit it is told in the ledger
     diagnosis : of the same assembly, when it has been made already
+    time_limit : seconds after which nothing new is begun on CAD faces that are kept; what was not done is told with its
+        place (a mesh, and `scope="all"`, have no limit)
     progress : called with a label and a share in [0, 1]
 
     Returns
@@ -60,13 +64,13 @@ def repair(
     say = progress or _silent
     if isinstance(layout, str) and layout != "auto":
         raise ParameterError(f'layout must be "auto", a QuadLayout or a list of patches, got {layout!r}')
-    task = _task(assembly, scope, openings, tolerance, domain, plan, diagnosis, say)
+    task = _task(assembly, scope, openings, tolerance, domain, plan, diagnosis, time_limit, say)
     if task.model.is_cad and scope == "least":
         if not isinstance(layout, str):
             raise ParameterError(
                 "a layout is for patches that replace a surface: CAD faces are kept unless scope is all"
             )
-        result = _cad(task, openings, say)
+        result = _cad(task, openings, say, time_limit)
         result = replace(result, ledger=(*task.entries, *result.ledger))
     else:
         from patchwright.repair.aside import with_aside
@@ -102,6 +106,7 @@ def plan_repair(
     tolerance: Tolerance | float | None = None,
     domain: Domain | None = None,
     diagnosis: Diagnosis | None = None,
+    time_limit: float = SECONDS,
     progress: Progress | None = None,
 ) -> Plan:
     """What `repair` would do with the same arguments, item by item; nothing is fitted, nothing is written.
@@ -111,11 +116,11 @@ def plan_repair(
     ParameterError : as `repair`.
     """
     say = progress or _silent
-    task = _task(assembly, scope, openings, tolerance, domain, None, diagnosis, say)
+    task = _task(assembly, scope, openings, tolerance, domain, None, diagnosis, time_limit, say)
     size = task.decisions.diagonal
     reasons = task.around.reasons
     if task.model.is_cad and scope == "least":
-        made = _cad(task, openings, say)
+        made = _cad(task, openings, say, time_limit)
         return plan_of(task.model.source, (*task.entries, *made.ledger), size, made.problems, reasons)
     from patchwright.repair.mend import mend
     from patchwright.repair.mesh_route import mending_ledger, problems_of
@@ -146,12 +151,15 @@ def _task(
     domain: Domain | None,
     plan: Plan | None,
     diagnosis: Diagnosis | None,
+    time_limit: float,
     say: Progress,
 ) -> _Task:
     if scope not in SCOPES:
         raise ParameterError(f"scope must be one of {', '.join(SCOPES)}, got {scope!r}")
     if openings not in OPENINGS:
         raise ParameterError(f"openings must be one of {', '.join(OPENINGS)}, got {openings!r}")
+    if not time_limit > 0.0:
+        raise ParameterError(f"a time limit must be a positive number of seconds, got {time_limit!r}")
     if not isinstance(domain, Domain | None):
         raise ParameterError(f"domain must be a Domain or None, got {type(domain).__name__}")
     model = Assembly.of(assembly) if isinstance(assembly, Triangulation) else assembly
@@ -209,7 +217,7 @@ def _body(model: Assembly, around: Surroundings, limits: Tolerance) -> tuple[Ass
     return replace(body, parts=tuple(parts)), (entry,)
 
 
-def _cad(task: _Task, openings: str, say: Progress) -> Repaired:
+def _cad(task: _Task, openings: str, say: Progress, time_limit: float) -> Repaired:
     from patchwright.repair.cad_route import repair_cad
 
     return repair_cad(
@@ -218,6 +226,7 @@ def _cad(task: _Task, openings: str, say: Progress) -> Repaired:
         openings=openings,
         diagnosis=task.diagnosis,
         decisions=task.decisions,
+        time_limit=time_limit,
         progress=say,
     )
 

@@ -25,6 +25,7 @@ from patchwright.repair.height_surface import Frame, Rim, height_surface
 from patchwright.repair.loop_shape import simple
 from patchwright.repair.pcurves import fitted, joined
 
+RIM = 64  # parts an edge is divided into where a surface is fitted to it
 PROBES = 12  # per span of an edge
 CORNER = 30.0  # degrees a ring turns at a corner of a four-sided patch
 GOES_ON = 0.5  # cosine of the angle between the plane's normal and a neighbour's up to which its slope is taken over
@@ -139,7 +140,7 @@ def _height(
     for loop in loops:
         for use in loop:
             curve = topology.curves[use.edge]
-            t = divided(curve.breaks, max(PROBES, 48 // (len(curve.breaks) - 1)))
+            t = _crowded(curve.breaks)
             local = frame.local(curve(t))
             along = frame.local(frame.origin + curve(t, 1))[:, :2]
             across = np.stack([along[:, 1], -along[:, 0]], axis=1)
@@ -171,7 +172,7 @@ def _judged(
     for loop in loops:
         for use in loop:
             curve = topology.curves[use.edge]
-            t = divided(curve.breaks, PROBES)
+            t = divided(_crowded(curve.breaks), 2)
             u, v = np.clip(use.pcurve(t), low, high).T
             worst = max(worst, float(np.linalg.norm(surface(u, v) - curve(t), axis=1).max()))
             beside = normals(use.edge, t)
@@ -227,6 +228,13 @@ def _sides(topology: Topology, ring: Steps) -> list[Steps]:
         tuple(ring[i % count] for i in range(a, b if b > a else b + count))
         for a, b in zip(corners, [*corners[1:], corners[0]], strict=True)
     ]
+
+
+def _crowded(breaks: Array) -> Array:
+    """Parameters along an edge, closer together towards its ends, where a corner bends the surface most."""
+    t0, t1 = float(breaks[0]), float(breaks[-1])
+    even = np.linspace(0.0, np.pi, RIM + 1)
+    return np.unique(np.concatenate([t0 + (t1 - t0) * 0.5 * (1.0 - np.cos(even)), breaks]))
 
 
 def _tangents(topology: Topology, step: tuple[int, bool]) -> tuple[Array, Array]:

@@ -1,0 +1,70 @@
+"""What the CAD route has come to so far: the assembly, what was sewn, mended, filled and left, and the words for it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from patchwright.models.arrays import Array
+from patchwright.models.assembly import Assembly
+from patchwright.models.cad.sewing import SewnResult
+from patchwright.repair.cad_draft import Attempt, Change
+from patchwright.repair.cad_heal import Healed
+from patchwright.repair.decisions import Candidate
+from patchwright.repair.result import Point
+
+POINT = 1e-9  # of the diagonal: an edge this short is a pole
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Filled:
+    """A further part that closes an opening or bridges a gap: which, the faces along it, what it is and how made."""
+
+    part: int
+    around: tuple[int, ...]
+    what: str
+    how: str
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Outcome:
+    """The assembly after keeping, sewing, healing and filling, with the words for the ledger.
+
+    `filled` are its invented parts; `left` the openings and gaps decided to stay; `failed` what was tried in vain after
+    healing; `undone` what the time did not suffice for.
+    """
+
+    assembly: Assembly
+    sewn: SewnResult | None
+    reason: str
+    healed: Healed | None = None
+    filled: tuple[Filled, ...] = ()
+    left: tuple[tuple[Candidate, str], ...] = ()
+    failed: tuple[Attempt, ...] = ()
+    undone: tuple[str, ...] = ()
+
+    @property
+    def changes(self) -> tuple[Change, ...]:
+        """What healing changed."""
+        return self.healed.changes if self.healed is not None else ()
+
+    @property
+    def in_vain(self) -> tuple[Attempt, ...]:
+        """All that was tried in vain."""
+        return (*(self.healed.failed if self.healed is not None else ()), *self.failed)
+
+
+def free_edges(assembly: Assembly) -> int:
+    """Edges one face uses once, poles left out; the number of parts where no topology is known."""
+    topology = assembly.topology
+    if topology is None:
+        return len(assembly.parts)
+    lengths = np.array([np.ptp(c(np.linspace(*c.domain, 5)), axis=0).max() for c in topology.curves])
+    return int(((topology.use_counts() == 1) & (lengths > POINT * assembly.diagonal)).sum())
+
+
+def point(where: Array | Point) -> Point:
+    """Three numbers."""
+    x, y, z = np.asarray(where, dtype=np.float64).tolist()
+    return x, y, z
