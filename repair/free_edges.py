@@ -15,9 +15,9 @@ from patchwright.models.arrays import Array
 from patchwright.models.cad.connectivity import is_point
 from patchwright.models.topology import EdgeUse, Topology
 from patchwright.repair.cad_draft import Change, Draft, Limits
-from patchwright.repair.pcurves import below
+from patchwright.repair.pcurves import below, inside
 from patchwright.repair.result import Rung
-from patchwright.repair.seam_curves import EXACT, inside, reattached, track, uses_of
+from patchwright.repair.seam_curves import EXACT, reattached, track, uses_of
 from patchwright.repair.seam_pieces import Piece
 
 SAMPLES = 65

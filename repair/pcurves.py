@@ -25,7 +25,8 @@ from patchwright.ssi.closed_forms.inversion import TURN, Analytic, inverted
 
 DEGREE = 5
 FIRST, MOST = 12, 768  # points per piece at first, and on all pieces when no more are tried
-KNOT_PROBES = 8  # per span of a pcurve, where its crossings of knot lines are looked for
+KNOT_PROBES = 8  # per span of a pcurve, where it may cross knot lines or leave its surface
+BEYOND = 1e-9  # of a domain: what a pcurve may leave it by
 BETWEEN = 4  # probes between two points
 POLE = 1e-9  # of the largest speed along a curve: where parameter lines run slower, they have no length
 
@@ -73,7 +74,7 @@ def _refined(
         sites = [_sites(a, b, count) for a, b in pieces]
         uv = parameters(surface, curve(np.concatenate(sites)), near)
         splits = np.cumsum([len(s) for s in sites])[:-1]
-        made = joined([spline(t, values) for t, values in zip(sites, np.split(uv, splits), strict=True)])
+        made = within(surface, joined([spline(t, some) for t, some in zip(sites, np.split(uv, splits), strict=True)]))
         probes = divided(np.unique(np.concatenate(sites)), BETWEEN)
         result = _judged(surface, curve, made, probes)
         if result.residual <= accuracy or count * len(pieces) >= MOST or result.residual > 0.5 * last:
@@ -132,6 +133,23 @@ def _from_beside(uv: Array, k: int, size: Array) -> None:
     before = np.maximum(after - 1, 0)
     nearer = np.where(np.abs(clear[before] - place) < np.abs(clear[after] - place), before, after)
     uv[:, k] = uv[clear[nearer], k]
+
+
+def inside(surface: Surface, pcurve: NurbsCurve) -> bool:
+    """Whether a pcurve stays in the domain of a NURBS; beyond it kernels carry the surface on, each in its own way."""
+    if not isinstance(surface, NurbsSurface):
+        return True
+    box = np.array(surface.domain)
+    uv = pcurve(divided(pcurve.breaks, KNOT_PROBES))
+    return bool((np.abs(np.clip(uv, box[:, 0], box[:, 1]) - uv) <= BEYOND * (box[:, 1] - box[:, 0])).all())
+
+
+def within(surface: Surface, pcurve: NurbsCurve) -> NurbsCurve:
+    """A pcurve that leaves the domain of a NURBS with its control points drawn back into it; any other as it is."""
+    if not isinstance(surface, NurbsSurface) or pcurve.rational or inside(surface, pcurve):
+        return pcurve
+    low, high = np.array(surface.domain).T
+    return NurbsCurve(pcurve.degree, pcurve.knots, np.clip(pcurve.control_points, low, high))
 
 
 def widened(surface: Surface, uv: Array) -> Surface:

@@ -18,7 +18,6 @@ from patchwright.models.boundary_strip import SIDES, border_below
 from patchwright.models.closest_point import closest_on_curve
 from patchwright.models.errors import GeometryError
 from patchwright.models.extension import curve_on
-from patchwright.models.knots import divided
 from patchwright.models.nurbs_curve import NurbsCurve
 from patchwright.models.nurbs_surface import NurbsSurface
 from patchwright.models.surface import Surface
@@ -33,8 +32,6 @@ EXACT = 0.02  # of the distance at which an edge lies on a surface: nearer than 
 FINE = 10.0  # of the rungs' finest length: how near a new edge follows its surfaces
 PER_SPAN = 3  # points of the first guess per control point of the leading edge
 MOST = 400  # points of the first guess
-PROBES = 8  # per span of a pcurve, where it may leave its surface
-BEYOND = 1e-9  # of a domain: what a pcurve may leave it by
 FAR = 1e-7  # of a domain: a pcurve this near its border runs along it
 
 
@@ -125,15 +122,6 @@ def _border(surface: Surface, pcurve: NurbsCurve) -> NurbsCurve | None:
         if max(abs(first[k] - box[k, end]), abs(last[k] - box[k, end])) <= FAR * size[k]:
             return border_below(surface, side, pcurve)
     return None
-
-
-def inside(surface: Surface, pcurve: NurbsCurve) -> bool:
-    """Whether a pcurve stays in the domain of a NURBS; beyond it kernels carry the surface on, each in its own way."""
-    if not isinstance(surface, NurbsSurface):
-        return True
-    box = np.array(surface.domain)
-    uv = pcurve(divided(pcurve.breaks, PROBES))
-    return bool((np.abs(np.clip(uv, box[:, 0], box[:, 1]) - uv) <= BEYOND * (box[:, 1] - box[:, 0])).all())
 
 
 def common(draft: Draft, one: Judged, ends: Array, limits: Limits) -> NurbsCurve | None:

@@ -21,9 +21,9 @@ from patchwright.models.topology import EdgeUse
 from patchwright.repair.cad_draft import Change, Draft, Limits
 from patchwright.repair.face_sides import one_sided
 from patchwright.repair.loop_shape import in_step, simple
-from patchwright.repair.pcurves import below
+from patchwright.repair.pcurves import below, inside
 from patchwright.repair.result import Rung
-from patchwright.repair.seam_curves import Judged, Meeting, common, inside, judged, reattached, track, uses_of
+from patchwright.repair.seam_curves import Judged, Meeting, common, judged, reattached, track, uses_of
 from patchwright.repair.seam_nodes import Nodes, placed
 from patchwright.repair.seam_pieces import Cut, Piece, cut, seams
 
