@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from patchwright.models.assembly import Part
+from patchwright.models.assembly import Assembly, Part
 from patchwright.models.cad.capping import FreeLoop, cap, free_loops, reason_against
 from patchwright.models.cad.rebuild import NOTHING
 from patchwright.models.cad.sewing import surface_difference
@@ -38,8 +38,8 @@ def bridged(outcome: Outcome, after: Diagnosis, decisions: Decisions | None, dea
         return outcome
     if deadline.passed:
         return replace(outcome, undone=(*outcome.undone, "bridging gaps"))
-    rings = tuple(loop for loop in free_loops(model) if any(_is(loop, gap) for gap in gaps))
-    missed = [gap for gap in gaps if not any(_is(ring, gap) for ring in rings)]
+    rings = tuple(loop for loop in free_loops(model) if any(_is(loop, gap, model) for gap in gaps))
+    missed = [gap for gap in gaps if not any(_is(ring, gap, model) for ring in rings)]
     why = "no closed ring of shared corners lies round it: it is between several rims, or its corners are apart"
     failed = tuple(Attempt("gap bridged", (), why, np.asarray(gap.where)) for gap in missed)
     outcome = replace(outcome, failed=(*outcome.failed, *failed))
@@ -103,9 +103,12 @@ def _free(
     return replace(outcome, left=(*outcome.left, *left)), free
 
 
-def _is(ring: FreeLoop, gap: Defect) -> bool:
-    """Whether a ring is the whole of a gap: both have one box."""
-    if not ring.closed or gap.box is None:
+def _is(ring: FreeLoop, gap: Defect, model: Assembly) -> bool:
+    """Whether a ring is the whole of a gap: both have one box, and no face is along the gap that is not along it.
+
+    A lid that came off its walls lies along the gap but not along the walls' ring: bridging that would leave it over.
+    """
+    if not ring.closed or gap.box is None or not set(gap.parts) <= {model.parts[face].name for face in ring.faces}:
         return False
     box = np.stack([ring.points.min(axis=0), ring.points.max(axis=0)])
     return bool(np.abs(box - gap.box).max() <= SAME * ring.diagonal)

@@ -69,6 +69,8 @@ def healed(model: Assembly, sewn: Outcome, deadline: Deadline) -> Outcome:
     Sewing takes edges within its tolerance for one; healing finds the curve where their surfaces meet. So where sewing
     left free edges or needed more than round-off, both are tried.
     """
+    if deadline.passed:
+        return replace(sewn, undone=(*sewn.undone, "mending faces and seams"))
     limits = Limits.of(model.diagonal, deadline.left(SECONDS))
     found = []
     if sewn.sewn is not None and (free_edges(sewn.assembly) or sewn.sewn.tolerance > COINCIDENT * model.diagonal):

@@ -17,7 +17,7 @@ from patchwright.models.arrays import Array
 from patchwright.models.nurbs_surface import NurbsSurface
 from patchwright.repair import spline_space
 
-CELLS = (8, 16, 24)
+CELLS = (6, 12, 18)
 MARGIN = 0.02  # of the box: how far it reaches beyond the rings
 HEIGHT, SLOPE = 1e16, 1e4  # weights of heights and slopes over the energy, in units of the box
 
