@@ -129,6 +129,9 @@ def repair(
     layout: Annotated[
         Path | None, typer.Option("--layout", help="Patches laid out as in this file, such as an edited layout.json.")
     ] = None,
+    time_limit: Annotated[
+        float, typer.Option("--time-limit", min=1.0, help="Seconds after which nothing new is begun on CAD faces.")
+    ] = 600.0,
     farfield: FarField = None,
     symmetry: Symmetry = None,
     fluid: Fluid = None,
@@ -161,6 +164,7 @@ def repair(
         scope=scope.value,
         openings=openings.value,
         layout=str(layout) if layout else "auto",
+        time_limit=time_limit,
         tolerance=tolerance,
         domain=_domain(farfield, symmetry, fluid),
         plan=plan,

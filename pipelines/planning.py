@@ -41,6 +41,7 @@ def run_plan(recipe: Recipe, *, write: Path | None = None, terminal: Terminal | 
             study.assembly,
             scope=options["scope"],
             openings=options["openings"],
+            time_limit=options["time_limit"],
             tolerance=study.tolerance,
             domain=study.domain,
             progress=report,

@@ -15,6 +15,7 @@ gaps.flap = "keep"       # a slot is no panel gap
 [[stage]]
 name = "repair"
 openings = "close"
+time_limit = 600         # seconds after which nothing new is begun on CAD faces
 """
 
 from __future__ import annotations
@@ -66,6 +67,7 @@ def repair_recipe(
     scope: str = "least",
     openings: str = "keep",
     layout: str = "auto",
+    time_limit: float = 600.0,
     tolerance: float | None = None,
     domain: Domain | None = None,
     plan: Path | None = None,
@@ -74,7 +76,7 @@ def repair_recipe(
     """What `patchwright repair` does."""
     steps = (
         Step("diagnose", {}),
-        Step("repair", {"scope": scope, "openings": openings, "layout": layout}),
+        Step("repair", {"scope": scope, "openings": openings, "layout": layout, "time_limit": time_limit}),
         Step("write", {}),
         Step("pictures", {}),
         Step("report", {}),

@@ -60,11 +60,19 @@ def _repair(study: Study, options: dict[str, Any], report: Report) -> Outcome:
         domain=study.domain,
         plan=study.plan,
         diagnosis=study.before,
+        time_limit=_seconds(options["time_limit"]),
         progress=report,
     )
     notes = study.notes if study.plan is None else (*study.notes, against_plan(study.plan, repaired))
     figures = {"verdict": repaired.verdict.value, "faces": len(repaired.faces)}
     return replace(study, repaired=repaired, notes=notes), figures
+
+
+def _seconds(wanted: Any) -> float:
+    """A time limit as given by a recipe."""
+    if isinstance(wanted, bool) or not isinstance(wanted, int | float) or not wanted > 0:
+        raise ParameterError(f"time_limit must be a positive number of seconds, got {wanted!r}")
+    return float(wanted)
 
 
 def _layout(wanted: str, study: Study) -> QuadLayout | list[Any] | str:
@@ -102,13 +110,14 @@ def _report(study: Study, options: dict[str, Any], report: Report) -> Outcome:
 
 
 AUTO = "auto"
+SECONDS = 600.0  # default time limit of a repair that keeps CAD faces
 GEOMETRY_FILES = ("repaired.step", "repaired.igs", "repaired.stl", "grid.xyz", "layout.json")
 
 STAGES: dict[str, Stage] = {
     stage.name: stage
     for stage in (
         Stage("diagnose", _diagnose, {}),
-        Stage("repair", _repair, {"scope": "least", "openings": "keep", "layout": AUTO}),
+        Stage("repair", _repair, {"scope": "least", "openings": "keep", "layout": AUTO, "time_limit": SECONDS}),
         Stage("write", _write, {"files": GEOMETRY_FILES}),
         Stage("pictures", _pictures, {}),
         Stage("report", _report, {}),
