@@ -2,8 +2,9 @@
 
 The stages, each of which changes as little as it can and writes down what it did: weld the copies of a point within the
 distance the data shows, drop collapsed and doubled triangles, make patch seams conform, take apart what too many
-triangles share, orient, trim sheets that run past each other, bridge gaps and holes, unite bodies that overlap. Corners
-of kept triangles move by welding only. What cannot be mended is a `Problem` with its place, never an exception.
+triangles share, orient, trim sheets that run past each other, bridge gaps and holes, unite bodies that overlap, wrap
+the bodies that are beyond all that. Corners of kept triangles move by welding only. What cannot be mended is a
+`Problem` with its place, never an exception.
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ from patchwright.repair.mend_notches import fill_notches
 from patchwright.repair.mend_openings import unite_as_decided
 from patchwright.repair.mend_overlaps import trim_overlaps
 from patchwright.repair.mend_seams import clean, conform_seams, orient_bodies, weld_copies
+from patchwright.repair.mend_wrap import wrap_bad
 from patchwright.repair.mended import BRIDGED, CUT, KEPT, Action, Dropped, Mended, Problem, Work, middle
 
 Progress = Callable[[str, float], None]
@@ -78,6 +80,8 @@ def mend(
     kept = unite_as_decided(work, openings)
     tell("cure", 0.85)
     cure(work)
+    tell("wrap", 0.88)
+    kept = wrap_bad(work, kept)
     tell("verify", 0.9)
     _verify(work)
     result = _result(work, kept)

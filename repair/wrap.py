@@ -8,7 +8,7 @@ slots as narrow go with them. An open sheet comes back as a thin body around it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import permutations
 
 import numpy as np
@@ -18,9 +18,12 @@ from patchwright.models.arrays import Array, IntArray
 from patchwright.models.errors import ParameterError
 from patchwright.models.tree import Tree
 from patchwright.models.triangulation import Triangulation
+from patchwright.repair.crossings import crossing_pairs
 
 OFFSET = 1.0  # cells
 LEAVE = 0.05  # of the offset that stays between the wrap and the input, so that thin parts keep a thickness
+BACK = 0.05  # of the way: how far vertices go back at least where the wrap would pass through itself
+TOUCH = 1e-9  # of the diagonal: what passes through by less touches
 MOST_CELLS = 4_000_000
 
 CORNERS = np.array([[i, j, k] for i in (0, 1) for j in (0, 1) for k in (0, 1)])
@@ -39,8 +42,10 @@ class Wrapped:
     nearest: IntArray
 
 
-def wrap(triangulation: Triangulation, cell: float) -> Wrapped:
-    """Wrap the triangles at a resolution of `cell` (model length unit).
+def wrap(triangulation: Triangulation, cell: float, leave: float | None = None) -> Wrapped:
+    """Wrap the triangles at a resolution of `cell` (model length unit), drawn back to `leave` from them.
+
+    The default of `leave` is `LEAVE` of the offset. An open sheet comes back twice as thick.
 
     Raises
     ------
@@ -64,12 +69,33 @@ def wrap(triangulation: Triangulation, cell: float) -> Wrapped:
     points, triangles = _march(place, level, local)
     shell = _outer(Triangulation(points, triangles))
     closest = tree.closest(shell.vertices)
-    drawn = closest.points + LEAVE * (shell.vertices - closest.points)
+    away = np.linalg.norm(shell.vertices - closest.points, axis=1, keepdims=True)
+    share = np.full_like(away, LEAVE)
+    if leave is not None:
+        share = np.minimum(1.0, leave / np.maximum(away, np.finfo(float).tiny))
+    drawn = _drawn(shell, closest.points, share)
     middle = tree.closest(drawn[shell.triangles].mean(axis=1))
     nearest = np.asarray(middle.triangle, dtype=np.int64)
     tags = None if triangulation.tags is None else triangulation.tags[nearest]
     result = Triangulation(drawn, shell.triangles, tags=tags, tag_names=triangulation.tag_names)
     return Wrapped(result, cell, offset, nearest)
+
+
+def _drawn(shell: Triangulation, foot: Array, share: Array) -> Array:
+    """Vertices drawn from the shell towards their feet, to a `share` (n, 1) of the way that is left.
+
+    Where triangles pass through each other there (the feet lie on folds of the input), theirs go back towards the
+    shell, which does not cross itself, until nothing does.
+    """
+    while True:
+        drawn = foot + share * (shell.vertices - foot)
+        pairs = crossing_pairs(replace(shell, vertices=drawn), TOUCH * shell.diagonal)
+        back = np.unique(shell.triangles[np.unique(pairs)])
+        back = back[share[back, 0] < 1.0]
+        if not len(back):
+            return np.asarray(drawn)
+        share = share.copy()
+        share[back] = np.minimum(1.0, 2.0 * share[back] + BACK)
 
 
 def _near_cells(tree: Tree, triangulation: Triangulation, origin: Array, cell: float, offset: float) -> IntArray:
