@@ -12,10 +12,11 @@ import numpy as np
 
 from patchwright.models.assembly import Assembly, Part
 from patchwright.models.cad.capping import FreeLoop, cap, free_loops, reason_against
+from patchwright.models.cad.connectivity import components
 from patchwright.models.cad.rebuild import NOTHING
 from patchwright.models.cad.sewing import surface_difference
 from patchwright.models.errors import EngineError
-from patchwright.repair.cad_draft import Attempt, Draft, Limits
+from patchwright.repair.cad_draft import RIM_SHARE, Attempt, Draft, Limits, apart
 from patchwright.repair.cad_outcome import Filled, Outcome, point
 from patchwright.repair.cad_sew import SEAM_SHARE, UNCHANGED
 from patchwright.repair.deadline import Deadline
@@ -43,6 +44,8 @@ def bridged(outcome: Outcome, after: Diagnosis, decisions: Decisions | None, dea
     why = "no closed ring of shared corners lies round it: it is between several rims, or its corners are apart"
     failed = tuple(Attempt("gap bridged", (), why, np.asarray(gap.where)) for gap in missed)
     outcome = replace(outcome, failed=(*outcome.failed, *failed))
+    rings, covered = _uncovered(rings, free_loops(model), model)
+    outcome = replace(outcome, failed=(*outcome.failed, *covered))
     outcome, rings = _free(outcome, rings, [BRIDGED] * len(rings), decisions)
     return _patched(outcome, rings, BRIDGED, "bridge", deadline)
 
@@ -112,6 +115,30 @@ def _is(ring: FreeLoop, gap: Defect, model: Assembly) -> bool:
         return False
     box = np.stack([ring.points.min(axis=0), ring.points.max(axis=0)])
     return bool(np.abs(box - gap.box).max() <= SAME * ring.diagonal)
+
+
+def _uncovered(
+    rings: tuple[FreeLoop, ...], every: tuple[FreeLoop, ...], model: Assembly
+) -> tuple[tuple[FreeLoop, ...], tuple[Attempt, ...]]:
+    """The rings that no loose piece lies over; such a piece may be what is missing there, only too far away."""
+    assert model.topology is not None
+    piece = {face: k for k, group in enumerate(components(model.topology)) for face in group}
+    free, covered = [], []
+    for ring in rings:
+        over = [
+            other
+            for other in every
+            if piece[other.faces[0]] != piece[ring.faces[0]]
+            and apart(ring.points, other.points).max() <= RIM_SHARE * ring.diagonal
+            and apart(other.points, ring.points).max() <= RIM_SHARE * ring.diagonal
+        ]
+        if over:
+            name = model.parts[over[0].faces[0]].name
+            why = f"{name} lies loose over it, farther away than a seam that came open, and may be what belongs there"
+            covered.append(Attempt(BRIDGED, ring.faces, why, ring.centre))
+        else:
+            free.append(ring)
+    return tuple(free), tuple(covered)
 
 
 def _patched(outcome: Outcome, rings: tuple[FreeLoop, ...], what: str, word: str, deadline: Deadline) -> Outcome:
