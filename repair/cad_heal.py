@@ -7,6 +7,7 @@ kernel and counts only if its seams, measured surface to surface, are closed and
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -37,14 +38,15 @@ class Healed:
     opened: int
 
 
-def heal(model: Assembly, limits: Limits) -> Healed | None:
+def heal(model: Assembly, limits: Limits, folded: Collection[int] = ()) -> Healed | None:
     """A sewn model with its bad faces mended and its open and loose seams closed as far as the rungs reach.
 
+    `folded` are faces that pass through themselves.
     None where there was nothing to do; the model as it came, with what was tried, where nothing held.
     """
     if model.topology is None:
         return None
-    model, changes, failed = mended_faces(model, limits)
+    model, changes, failed = mended_faces(model, limits, folded)
     apart = 0
     if not limits.expired:
         model, done, missed, apart = _brought_together(model, limits)

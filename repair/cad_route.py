@@ -51,7 +51,7 @@ def repair_cad(
     progress("sewing", 0.2)
     outcome = sewn(model, deadline)
     progress("healing faces and seams", 0.3)
-    outcome = healed(model, outcome, deadline)
+    outcome = healed(model, outcome, deadline, _folded(model, diagnosis))
     domain = decisions.surroundings.domain if decisions is not None else None
     after = diagnosis
     if outcome.sewn is not None or outcome.changes:
@@ -103,6 +103,13 @@ def repair_cad(
         grid=grid,
         figures=_figures(outcome.assembly, seams, blocks, after, len(outcome.filled)),
     )
+
+
+def _folded(model: Assembly, diagnosis: Diagnosis) -> set[int]:
+    """The faces that pass through themselves, as far as their names tell which they are."""
+    alone = {d.parts[0] for d in diagnosis.defects if d.kind == "self-intersection" and len(set(d.parts)) == 1}
+    names = model.names
+    return {i for i, name in enumerate(names) if name in alone and names.count(name) == 1}
 
 
 def _invented(outcome: Outcome) -> BoolArray:

@@ -6,6 +6,7 @@ surface to surface, are closed, or no wider than the file's own edges leave them
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import replace
 
 import numpy as np
@@ -63,7 +64,7 @@ def sewn(model: Assembly, deadline: Deadline) -> Outcome:
     )
 
 
-def healed(model: Assembly, sewn: Outcome, deadline: Deadline) -> Outcome:
+def healed(model: Assembly, sewn: Outcome, deadline: Deadline, folded: Collection[int] = ()) -> Outcome:
     """The sewn model healed, or the model as it came where healing alone closes as much with narrower seams.
 
     Sewing takes edges within its tolerance for one; healing finds the curve where their surfaces meet. So where sewing
@@ -74,12 +75,12 @@ def healed(model: Assembly, sewn: Outcome, deadline: Deadline) -> Outcome:
     limits = Limits.of(model.diagonal, deadline.left(SECONDS))
     found = []
     if sewn.sewn is not None and (free_edges(sewn.assembly) or sewn.sewn.tolerance > COINCIDENT * model.diagonal):
-        alone = heal(model, limits)
+        alone = heal(model, limits, folded)
         if alone is not None and alone.changes:
             found.append(Outcome(alone.assembly, None, sewn.reason, alone))
     if not found or free_edges(found[0].assembly):
         limits = Limits.of(model.diagonal, deadline.left(SECONDS))
-        made = heal(sewn.assembly, limits)
+        made = heal(sewn.assembly, limits, folded)
         found.append(sewn if made is None else replace(sewn, assembly=made.assembly, healed=made))
 
     else:

@@ -45,17 +45,21 @@ STEPS: tuple[tuple[str, Step], ...] = (
 )
 
 
-def mended_faces(model: Assembly, limits: Limits) -> tuple[Assembly, Changes, Attempts]:
-    """The model with its bad faces mended as far as the steps reach, what was done, and what was tried in vain."""
+def mended_faces(model: Assembly, limits: Limits, folded: Collection[int] = ()) -> tuple[Assembly, Changes, Attempts]:
+    """The model with its bad faces mended as far as the steps reach, what was done, and what was tried in vain.
+
+    Bad is what the kernel calls so, and `folded`, faces that pass through themselves.
+    """
     changes: Changes = ()
     failed: Attempts = ()
-    bad = bad_faces(model, limits)
+    bad = bad_faces(model, limits) | set(folded)
     for what, step in STEPS:
         if limits.expired:
             start = Draft(model, model.topology) if model.topology is not None else None
             failed += tuple(Attempt(what, (f,), "the time was up", start.middle(f)) for f in sorted(bad) if start)
             break
         model, bad, done, missed = _stepped(model, bad, limits, what, step)
+        bad |= set(folded)
         changes, failed = (*changes, *done), (*failed, *missed)
     return model, changes, failed
 
