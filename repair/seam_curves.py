@@ -32,6 +32,7 @@ EXACT = 0.02  # of the distance at which an edge lies on a surface: nearer than 
 FINE = 10.0  # of the rungs' finest length: how near a new edge follows its surfaces
 PER_SPAN = 3  # points of the first guess per control point of the leading edge
 MOST = 400  # points of the first guess
+SAME_SIDE = 0.9998  # cosine between the ways into two faces: one lies on the other
 FAR = 1e-7  # of a domain: a pcurve this near its border runs along it
 
 
@@ -41,6 +42,7 @@ class Meeting(Enum):
     LIES = "an edge of one lies on the other"
     CROSS = "the surfaces cross"
     APART = "the surfaces are apart"
+    FOLD = "one face lies on the other"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -74,13 +76,32 @@ def judged(draft: Draft, seam: Seam, uses: dict[int, EdgeUse], limits: Limits) -
     scale = [round(float(np.log10(max(some, 1e-3 * limits.fit)))) for some in far]
     best = min(range(len(far)), key=lambda k: (scale[k], rims[k], far[k], len(tracks[k].control_points)))
     own, other = (draft.surface(face) for face in candidates[best].faces)
-    if far[best] <= EXACT * limits.on:
+    if _folded(draft, candidates[best], tracks[best], uses):
+        meeting = Meeting.FOLD
+    elif far[best] <= EXACT * limits.on:
         meeting = Meeting.LIES
     elif across(own, other, points[best]).min() >= CROSSING:
         meeting = Meeting.CROSS
     else:
         meeting = Meeting.LIES if far[best] <= limits.on else Meeting.APART
     return Judged(candidates[best], meeting, tracks[best], far[best])
+
+
+def _folded(draft: Draft, seam: Seam, own: NurbsCurve, uses: dict[int, EdgeUse]) -> bool:
+    """Whether both faces lie on the same side of a seam: then they overlap there and do not meet."""
+    t0, t1 = own.domain
+    t = t0 + (t1 - t0) * np.array([0.2, 0.5, 0.8])
+    points, along = own(t), own(t, 1)
+    sign = [-1.0 if uses[seam.lead.edge].reversed else 1.0]
+    sign.append(-1.0 if uses[seam.others[0].edge].reversed != seam.against else 1.0)
+    # a loop has its face on its left, seen against the surface's own normal
+    inward = [
+        direction * np.cross(feet(draft.surface(face), points)[1], along)
+        for face, direction in zip(seam.faces, sign, strict=True)
+    ]
+    size = np.prod([np.linalg.norm(some, axis=1) for some in inward], axis=0)
+    together = np.einsum("ij,ij->i", *inward) > SAME_SIDE * size
+    return bool(np.count_nonzero(together & (size > 0.0)) > 1)
 
 
 def _below(surface: Surface, points: Array) -> tuple[float, int]:

@@ -78,7 +78,7 @@ def _joined(draft: Draft, reach: float, limits: Limits) -> tuple[Draft, tuple[Ch
     whole = cut(draft, reach)
     uses = uses_of(draft)
     found = [judged(draft, seam, uses, limits) for seam in seams(draft, whole, reach)]
-    found = [one for one in found if one.meeting is not Meeting.APART]
+    found = [one for one in found if one.meeting in (Meeting.LIES, Meeting.CROSS)]
     for _ in range(ROUNDS):
         if not found or limits.expired:
             break
