@@ -64,7 +64,7 @@ def repair(
     say = progress or _silent
     if isinstance(layout, str) and layout != "auto":
         raise ParameterError(f'layout must be "auto", a QuadLayout or a list of patches, got {layout!r}')
-    task = _task(assembly, scope, openings, tolerance, domain, plan, diagnosis, time_limit, say)
+    task = _task(assembly, scope, openings, tolerance, domain, plan, diagnosis, say)
     if task.model.is_cad and scope == "least":
         if not isinstance(layout, str):
             raise ParameterError(
@@ -116,7 +116,7 @@ def plan_repair(
     ParameterError : as `repair`.
     """
     say = progress or _silent
-    task = _task(assembly, scope, openings, tolerance, domain, None, diagnosis, time_limit, say)
+    task = _task(assembly, scope, openings, tolerance, domain, None, diagnosis, say)
     size = task.decisions.diagonal
     reasons = task.around.reasons
     if task.model.is_cad and scope == "least":
@@ -151,15 +151,12 @@ def _task(
     domain: Domain | None,
     plan: Plan | None,
     diagnosis: Diagnosis | None,
-    time_limit: float,
     say: Progress,
 ) -> _Task:
     if scope not in SCOPES:
         raise ParameterError(f"scope must be one of {', '.join(SCOPES)}, got {scope!r}")
     if openings not in OPENINGS:
         raise ParameterError(f"openings must be one of {', '.join(OPENINGS)}, got {openings!r}")
-    if not time_limit > 0.0:
-        raise ParameterError(f"a time limit must be a positive number of seconds, got {time_limit!r}")
     if not isinstance(domain, Domain | None):
         raise ParameterError(f"domain must be a Domain or None, got {type(domain).__name__}")
     model = Assembly.of(assembly) if isinstance(assembly, Triangulation) else assembly
@@ -218,6 +215,8 @@ def _body(model: Assembly, around: Surroundings, limits: Tolerance) -> tuple[Ass
 
 
 def _cad(task: _Task, openings: str, say: Progress, time_limit: float) -> Repaired:
+    if not time_limit > 0.0:
+        raise ParameterError(f"a time limit must be a positive number of seconds, got {time_limit!r}")
     from patchwright.repair.cad_route import repair_cad
 
     return repair_cad(
