@@ -123,3 +123,43 @@ def test_free_edges_of_real_files(data, name: str, free: int, left: int) -> None
     summary = diagnose(read(data(name))).summary
     assert summary["open_edges"] == free
     assert summary["free_edges_by_tolerance"][3]["free_edges"] == left
+
+
+@pytest.mark.parametrize("lift", [1e-3, 1e-2])
+def test_a_lid_lifted_off_its_walls_is_a_gap_and_not_an_opening(tmp_path, lift: float) -> None:
+    from oracles_cad_damage import SIZES, centre, faces_of, rounded_box, shifted, shrunk, written
+
+    height = lift * float(np.linalg.norm(SIZES))
+    faces = faces_of(rounded_box())
+    top = max(range(len(faces)), key=lambda k: centre(faces[k]).Z())
+    lid = shifted(shrunk(faces[top], 0.999), (0, 0, height))
+    found = diagnose(read(written(tmp_path / "lid.step", [*faces[:top], lid, *faces[top + 1 :]], {top})))
+    (gap,) = found.of("gap")
+    assert gap.size == pytest.approx(height, rel=0.2)
+    assert not found.of("opening")
+
+
+def test_a_loop_cut_out_of_an_open_sheet_is_an_opening_and_in_a_closed_body_a_missing_face(tmp_path) -> None:
+    from OCP.BRepAlgoAPI import BRepAlgoAPI_Cut
+    from OCP.BRepGProp import BRepGProp
+    from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox, BRepPrimAPI_MakeCylinder
+    from OCP.gp import gp_Ax2, gp_Dir, gp_Pnt
+    from OCP.GProp import GProp_GProps
+    from oracles_cad_damage import faces_of, written
+
+    drill = BRepPrimAPI_MakeCylinder(gp_Ax2(gp_Pnt(5, 5, 5), gp_Dir(0, 0, 1)), 0.4, 10.0).Shape()
+    block = faces_of(BRepAlgoAPI_Cut(BRepPrimAPI_MakeBox(10.0, 10.0, 10.0).Shape(), drill).Shape())
+
+    def area(face) -> float:
+        properties = GProp_GProps()
+        BRepGProp.SurfaceProperties_s(face, properties)
+        return properties.Mass()
+
+    (drilled,) = [face for face in block if 99.0 < area(face) < 99.9]
+    sheet = diagnose(read(written(tmp_path / "sheet.step", [drilled], {0})))
+    assert sorted(d.kind for d in sheet.defects if d.severity != "info") == ["opening", "opening"]
+    # the block without the wall and the bottom of its hole
+    shell = [face for face in block if area(face) > 50.0]
+    assert len(shell) == len(block) - 2 == 6
+    body = diagnose(read(written(tmp_path / "body.step", shell, set())))
+    assert [d.kind for d in body.defects if d.severity == "error"] == ["gap"]
