@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from patchwright.models.arrays import Array, BoolArray, IntArray, frozen
-from patchwright.repair.spline_space import interior_fit, refinement, uniform_collocation
+from patchwright.repair.fair_fit import curve_fit, curve_normal
+from patchwright.repair.spline_space import collocation, refinement, uniform_collocation
 
 SAMPLES_PER_CELL = 6
 CREASE_TURN = 0.87  # cosine of 30 degrees: planes whose line is farther from the crease are not those of its sides
@@ -120,9 +121,8 @@ def fit_edges(paths: list[tuple[IntArray, Array]], cells: IntArray) -> EdgeCurve
     groups = []
     for which, samples in paths:
         own, count = int(cells[which[0]]), samples.shape[1]
-        basis = uniform_collocation(own, count)
-        ends = basis[1:-1, :1] * samples[:, :1] + basis[1:-1, -1:] * samples[:, -1:]
-        inner = np.einsum("ij,kjd->kid", interior_fit(own, count), samples[:, 1:-1] - ends)
+        from_samples, from_ends = curve_fit(own, count, 1)
+        inner = from_samples @ samples + from_ends[:, [0, -1]] @ samples[:, [0, -1]]
         groups.append((which, np.concatenate([samples[:, :1], inner, samples[:, -1:]], axis=1)))
     return EdgeCurves.pack(cells, groups)
 
@@ -158,3 +158,81 @@ def with_end_tangents(edges: EdgeCurves, normals: Array, second: Array, fixed: B
             points[sound, arm] = (points[:, tip] + flat)[sound]
         groups.append((which, points))
     return EdgeCurves.pack(np.asarray(edges.cells), groups)
+
+
+def with_end_bends(edges: EdgeCurves, normals: Array, bends: Array, bent: BoolArray, most: float) -> EdgeCurves:
+    """The curves with given normal curvatures at some of their ends; ends and end tangents stay.
+
+    Parameters
+    ----------
+    normals : (e, 2, 3) unit surface normals at the start and end of each edge
+    bends : (e, 2) the wanted normal curvatures, 1 over length, positive where the curve bends towards the normal
+    bent : (e, 2) the ends to change; of curves of fewer than three pieces only one end has room, the first is taken
+    most : length no control point moves farther than; a curve that would have to keeps a part of its own curvatures
+
+    The change is the least in the mean square along the curve.
+    """
+    groups = []
+    ends = np.array([0.0, 1.0])
+    for cells, which, points in edges.groups():
+        points = points.copy()
+        active = bent[which].copy()
+        if cells < 3:
+            active[:, 1] &= ~active[:, 0]
+        if cells > 1 and active.any():
+            first, second = (collocation(cells, ends, order) for order in (1, 2))
+            normal = normals[which]
+            wanted = bends[which] * (np.einsum("ei,kid->ked", first, points) ** 2).sum(axis=-1)
+            missing = np.where(active, wanted - (np.einsum("ei,kid->ked", second, points) * normal).sum(axis=-1), 0.0)
+            reply = np.linalg.solve(curve_normal(cells, 4 * cells + 1)[2:-2, 2:-2], second[:, 2:-2].T)
+            mutual = (second[:, 2:-2] @ reply) * np.matmul(normal, np.swapaxes(normal, 1, 2))
+            mutual = np.where(active[:, :, None] & active[:, None, :], mutual, 0.0)
+            mutual += np.where(active, 0.0, 1.0)[:, :, None] * np.eye(2)
+            force = np.linalg.solve(mutual, missing[..., None]) * active[..., None]
+            move = np.einsum("ie,ked->kid", reply, force * normal)
+            size = np.linalg.norm(move, axis=2).max(axis=1)
+            points[:, 2:-2] += np.minimum(1.0, most / np.maximum(size, most))[:, None, None] * move
+        groups.append((which, points))
+    return EdgeCurves.pack(np.asarray(edges.cells), groups)
+
+
+def with_tips(edges: EdgeCurves, tips: Array, groups: list[tuple[IntArray, Array]], least: float) -> EdgeCurves:
+    """The curves fitted anew to samples, ends held and end tangents free in length alone; others stay.
+
+    Parameters
+    ----------
+    tips : (e, 2, 3) unit directions in which each curve leaves its start and its end
+    groups : (edge indices, (k, count, 3) samples at equidistant parameters); each group shares its cell count
+    least : share of its present length below which no leg of the control polygon falls
+    """
+    controls = edges.controls.copy()
+    for which, samples in groups:
+        cells, count = int(edges.cells[which[0]]), samples.shape[1]
+        rows = edges.offsets[which][:, None] + np.arange(cells + 3)
+        points = controls[rows]
+        normal, basis = curve_normal(cells, count), uniform_collocation(cells, count)
+        legs = [1, cells + 1]
+        base = np.zeros_like(points)  # the control points without what is free
+        base[:, [0, -1]], base[:, legs] = points[:, [0, -1]], points[:, [0, -1]]
+        rest = (cells / count) * np.einsum("ci,kcd->kid", basis, samples) - normal @ base
+        # the free numbers: both lengths, then the inner control points
+        n = 2 + 3 * (cells - 1)
+        matrix, right = np.zeros((len(which), n, n)), np.zeros((len(which), n))
+        tip = tips[which]
+        inner = normal[2:-2, 2:-2]
+        matrix[:, :2, :2] = normal[np.ix_(legs, legs)] * np.matmul(tip, np.swapaxes(tip, 1, 2))
+        mixed = np.einsum("ej,ked->kejd", normal[legs, 2:-2], tip).reshape(len(which), 2, n - 2)
+        matrix[:, :2, 2:], matrix[:, 2:, :2] = mixed, np.swapaxes(mixed, 1, 2)
+        matrix[:, 2:, 2:] = np.kron(inner, np.eye(3))
+        right[:, :2] = (rest[:, legs] * tip).sum(axis=-1)
+        right[:, 2:] = rest[:, 2:-2].reshape(len(which), n - 2)
+        found = np.linalg.solve(matrix, right[..., None])[..., 0]
+        present = np.linalg.norm(points[:, legs] - points[:, [0, -1]], axis=-1)
+        length = np.maximum(found[:, :2], least * present)
+        if (length > found[:, :2]).any():  # the inner points answer to the lengths as they are
+            right = right[:, 2:] - np.einsum("kej,ke->kj", mixed, length)
+            found[:, 2:] = np.linalg.solve(matrix[:, 2:, 2:], right[..., None])[..., 0]
+        points[:, legs] = points[:, [0, -1]] + length[..., None] * tip
+        points[:, 2:-2] = found[:, 2:].reshape(len(which), cells - 1, 3)
+        controls[rows] = points
+    return EdgeCurves(edges.cells, edges.offsets, controls)

@@ -1,21 +1,13 @@
-"""Smooth joins: one normal field per edge and vertex, and the inner control rows that follow it.
-
-Source: Hamann, Jean, Razdan, section 3 (tangent-plane continuity after Faux & Pratt). Departure: instead of one
-constant ratio per edge, both neighbours are made to have the edge's common normal at the collocation points, which
-lets them differ in their number of pieces. Between the points the angle that is left falls with the cell size; it is
-measured, never assumed.
-"""
+"""What the joins of patches are like: normals at corners and along sides, sectors, and the angles of the seams."""
 
 from __future__ import annotations
-
-from dataclasses import dataclass
 
 import numpy as np
 
 from patchwright.models.arrays import Array, BoolArray, IntArray
 from patchwright.repair.patch_nets import PatchNets, normals_of
 from patchwright.repair.quad_layout import QuadLayout
-from patchwright.repair.spline_space import collocation, greville, uniform_collocation
+from patchwright.repair.spline_space import collocation, uniform_collocation
 
 FIELD_SAMPLES = 33  # parameters at which an edge's normal field is stored
 OUTLIER = 0.0  # cosine: a corner turned from the mean of its sector by more than a right angle is a fold, not a bend
@@ -47,14 +39,11 @@ def _inner_normals(group: Array, cells: tuple[int, int], share: float) -> Array:
     return np.asarray(normals_of(du, dv)[:, CORNER_U, CORNER_V])
 
 
-def sector_normals(layout: QuadLayout, at_corners: Array, weights: Array | None = None) -> Array:
-    """(m, 4, 3) the mean normal of the smooth sector each quad corner belongs to.
+def sector_labels(layout: QuadLayout) -> IntArray:
+    """(m, 4) number of the smooth sector each quad corner belongs to.
 
     A sector is the set of corners round a vertex that reach each other across smooth edges; sharp edges and boundaries
-    separate sectors, so a vertex on a crease has one normal per side. `weights` (m, 4) tell how far each corner's
-    normal is to be trusted. A corner turned from the mean by more than `OUTLIER` has no part in the final mean, unless
-    that leaves none. At a cusp, where the normals are spread over more than a cone of that opening, there is no common
-    normal: zero.
+    separate sectors, so a vertex on a crease has one normal per side.
     """
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
@@ -74,6 +63,19 @@ def sector_normals(layout: QuadLayout, at_corners: Array, weights: Array | None 
     j = np.concatenate([other_start, other_end])
     count = 4 * len(layout.quads)
     _, label = connected_components(coo_matrix((np.ones(len(i)), (i, j)), shape=(count, count)), directed=False)
+    return np.asarray(label.reshape(-1, 4), dtype=np.int64)
+
+
+def sector_normals(layout: QuadLayout, at_corners: Array, weights: Array | None = None) -> Array:
+    """(m, 4, 3) the mean normal of the smooth sector each quad corner belongs to.
+
+    `weights` (m, 4) tell how far each corner's
+    normal is to be trusted. A corner turned from the mean by more than `OUTLIER` has no part in the final mean, unless
+    that leaves none. At a cusp, where the normals are spread over more than a cone of that opening, there is no common
+    normal: zero.
+    """
+    label = sector_labels(layout).reshape(-1)
+    count = len(label)
     normals = at_corners.reshape(-1, 3)
     trust = np.ones(count) if weights is None else weights.reshape(-1)
 
@@ -95,13 +97,22 @@ def smooth_edges(layout: QuadLayout) -> BoolArray:
     return np.asarray(~layout.sharp & ~layout.boundary)
 
 
+def regular_edges(layout: QuadLayout) -> BoolArray:
+    """(e,) smooth edges between two vertices with four edges each, all of them smooth."""
+    smooth = smooth_edges(layout)
+    count = len(layout.vertices)
+    regular = np.bincount(layout.edges.reshape(-1), minlength=count) == 4
+    regular[layout.edges[~smooth]] = False
+    return np.asarray(smooth & regular[layout.edges].all(axis=1))
+
+
 def edge_end_normals(layout: QuadLayout, sectors: Array) -> tuple[Array, Array]:
     """Two (e, 2, 3) arrays: the sector normals at the start and end of each edge on its first and on its second side.
 
-    On a smooth edge and on a boundary both are the same.
+    On a smooth edge and on a boundary both are the same. Any other values of the sectors, (m, 4, d), may be asked for.
     """
     e = len(layout.edges)
-    out = np.zeros((2, e, 2, 3))
+    out = np.zeros((2, e, 2, sectors.shape[-1]))
     seen = np.zeros(e, dtype=np.int64)
     for k in range(4):
         edge = layout.quad_edges[:, k]
@@ -158,109 +169,6 @@ def seam_angles(layout: QuadLayout, sides: Array) -> Array:
     return np.asarray(np.degrees(2.0 * np.arcsin(half)).max(axis=1))
 
 
-def edge_fields(layout: QuadLayout, sides: Array, sectors: Array) -> Array:
-    """(e, FIELD_SAMPLES, 3) the common unit normal along every edge, in the edge's direction.
-
-    The mean of both sides' normals (`side_normals`), running to the sector normals at the vertices. Only the smooth
-    edges' rows mean anything.
-    """
-    total = np.zeros((len(layout.edges), sides.shape[2], 3))
-    for k in range(4):
-        np.add.at(total, layout.quad_edges[:, k], sides[:, k])
-    start, _ = edge_end_normals(layout, sectors)
-    total = _unit(total)
-    # the ends jump to the sector normal; the jump is spread linearly along the edge, so the field stays smooth
-    t = np.linspace(0.0, 1.0, sides.shape[2])[:, None]
-    there = np.any(start != 0.0, axis=2, keepdims=True)  # at a cusp every edge keeps its own normal
-    jump = np.where(there, start - total[:, [0, -1]], 0.0)
-    total = total + (1 - t) * jump[:, :1] + t * jump[:, 1:]
-    return _unit(total)
-
-
 def _unit(vectors: Array) -> Array:
     length = np.linalg.norm(vectors, axis=-1, keepdims=True)
     return np.asarray(np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0))
-
-
-def follow_fields(layout: QuadLayout, nets: PatchNets, fields: Array) -> PatchNets:
-    """The patches with their first inner rows moved along the normal until they have the edges' common normals.
-
-    At the Greville points of every smooth side the cross-boundary derivative is made perpendicular to the edge's
-    normal; the twist control points serve two sides and take the least-squares compromise.
-    """
-    smooth = smooth_edges(layout)
-    groups = []
-    for (m, n), which, group in nets.groups():
-        groups.append((which, _follow(layout, which, group, (m, n), fields, smooth)))
-    return PatchNets.pack(np.asarray(nets.cells), groups)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Side:
-    """One side of k patches: its conditions and the inner control points that may move.
-
-    `slots` (n,) numbers them on the ring; `basis` (n, n) their weights at the Greville points; `normal` and `leg`
-    (k, n, 3) the edge's normal and the cross-boundary difference there; `active` (k,) sides that are smooth.
-    """
-
-    slots: IntArray
-    basis: Array
-    normal: Array
-    leg: Array
-    active: BoolArray
-
-
-def _follow(
-    layout: QuadLayout, which: IntArray, nets: Array, cells: tuple[int, int], fields: Array, smooth: BoolArray
-) -> Array:
-    """Moved copies of nets (k, M + 3, N + 3, 3) of one size."""
-    m, n = cells
-    ring = -np.ones((m + 3, n + 3), dtype=np.int64)  # numbers of the inner control points next to the boundary
-    ring[1 : m + 2, [1, n + 1]] = ring[[1, m + 1], 1 : n + 2] = 0
-    i, j = np.nonzero(ring == 0)
-    ring[i, j] = np.arange(len(i))
-    rows = (nets[:, :, 0], nets[:, -1], nets[:, :, -1], nets[:, 0])
-    inner = (nets[:, :, 1], nets[:, -2], nets[:, :, -2], nets[:, 1])
-    slots = (ring[1:-1, 1], ring[m + 1, 1:-1], ring[1:-1, n + 1], ring[1, 1:-1])
-    sides = []
-    for k in range(4):
-        edge = layout.quad_edges[which, k]
-        field = fields[edge]
-        backward = layout.edge_reversed[which, k] != (k >= 2)
-        field[backward] = field[backward][:, ::-1]
-        sides.append(_side(cells[k % 2], slots[k], rows[k], inner[k] - rows[k], field, smooth[edge]))
-    direction = np.zeros((len(which), len(i), 3))
-    for side in sides:
-        direction[:, side.slots] += np.where(side.active[:, None, None], side.normal, 0.0)
-    direction = _unit(direction)
-    matrix, value, legs = [], [], []
-    for side in sides:
-        scale = np.linalg.norm(side.leg, axis=-1)
-        scale[scale == 0.0] = 1.0
-        turn = np.zeros((len(which), len(side.slots), len(i)))
-        turn[:, :, side.slots] = side.basis * np.einsum("kad,ksd->kas", side.normal, direction[:, side.slots])
-        weight = np.where(side.active[:, None], 1.0 / scale, 0.0)
-        matrix.append(turn * weight[..., None])
-        value.append(-np.einsum("kad,kad->ka", side.leg, side.normal) * weight)
-        legs.append(scale)
-    # damped least squares in units of the patch's own legs: where two sides want contradicting twists, nobody gets far
-    leg = np.concatenate(legs, axis=1).mean(axis=1)[:, None, None]
-    equations, wanted = np.concatenate(matrix, axis=1) * leg, np.concatenate(value, axis=1)[..., None]
-    transposed = np.swapaxes(equations, 1, 2)
-    move = np.linalg.solve(transposed @ equations + DAMPING**2 * np.eye(len(i)), transposed @ wanted) * leg
-    moved = nets.copy()
-    moved[:, i, j] += move * direction
-    return moved
-
-
-def _side(own: int, slots: IntArray, border: Array, leg: Array, field: Array, active: BoolArray) -> _Side:
-    """The conditions along a side of `own` pieces: from its control row, the legs to the next, and the edge's field."""
-    from scipy.interpolate import CubicSpline
-
-    sites = greville(own)[1:-1]
-    basis = collocation(own, sites)
-    normal = _unit(CubicSpline(np.linspace(0.0, 1.0, field.shape[1]), field, axis=1)(sites))
-    # the shared boundary's own tangent stays perpendicular to the normal
-    tangent = _unit(np.einsum("ai,kid->kad", collocation(own, sites, 1), border))
-    normal = _unit(normal - (normal * tangent).sum(-1, keepdims=True) * tangent)
-    return _Side(slots, basis[:, 1:-1], normal, np.einsum("ai,kid->kad", basis, leg), active)

@@ -12,10 +12,10 @@ import numpy as np
 
 from patchwright.models.arrays import Array, BoolArray, IntArray
 from patchwright.repair.coons import coons_grid, offset_distance, offset_normals
+from patchwright.repair.fair_fit import fit_patches
 from patchwright.repair.filling import FillStatus, fill
-from patchwright.repair.patch_nets import evaluate
 from patchwright.repair.projection import Ground, project
-from patchwright.repair.spline_space import interior_fit, uniform_collocation
+from patchwright.repair.spline_space import uniform_collocation
 from patchwright.repair.true_surface import Outcome
 
 SAMPLES_PER_CELL = 4
@@ -124,13 +124,9 @@ def _most_frequent(group: IntArray, label: IntArray, count: int) -> IntArray:
 
 
 def _least_squares(rows: tuple[Array, Array, Array, Array], grid: Array, cells: tuple[int, int]) -> Array:
-    """Interior control points by tensor-product least squares, the boundary rows held."""
+    """Interior control points by fair least squares, the boundary rows held."""
     south, north, west, east = rows
     nets = np.zeros((len(grid), cells[0] + 3, cells[1] + 3, 3))
     nets[:, :, 0], nets[:, :, -1] = south, north
     nets[:, 0], nets[:, -1] = west, east
-    m, n = grid.shape[1] - 1, grid.shape[2] - 1
-    held = evaluate(nets, uniform_collocation(cells[0], m + 1), uniform_collocation(cells[1], n + 1))
-    rest = (grid - held)[:, 1:-1, 1:-1]
-    nets[:, 1:-1, 1:-1] = evaluate(rest, interior_fit(cells[0], m + 1), interior_fit(cells[1], n + 1))
-    return nets
+    return fit_patches(nets, grid)

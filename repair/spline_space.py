@@ -48,16 +48,6 @@ def uniform_collocation(cells: int, count: int, derivative: int = 0) -> Array:
 
 
 @lru_cache(maxsize=256)
-def interior_fit(cells: int, count: int) -> Array:
-    """(cells + 1, count - 2) least-squares map: interior samples -> interior control points, both ends held.
-
-    The samples must already have the end control points' share subtracted.
-    """
-    inner = uniform_collocation(cells, count)[1:-1, 1:-1]
-    return np.asarray(np.linalg.pinv(inner), dtype=np.float64)
-
-
-@lru_cache(maxsize=256)
 def refinement(coarse: int, fine: int) -> Array:
     """(fine + 3, coarse + 3) knot insertion as one matrix: the same curve in the finer space."""
     if fine % coarse:

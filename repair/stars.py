@@ -58,7 +58,7 @@ def spread(layout: QuadLayout, curves: EdgeCurves, sectors: Array, free: BoolArr
     wrong = known & ((angle < LEAST_CORNER) | (angle > 180.0 - LEAST_CORNER))
     if not wrong.any():
         return curves
-    one, two, end_one, end_two = _corner_ends(layout)
+    one, two, end_one, end_two = corner_ends(layout)
     slot_one, slot_two = 2 * one + end_one, 2 * two + end_two
     turn = np.zeros(2 * len(layout.edges))
     may = np.repeat(free, 2)
@@ -93,7 +93,7 @@ def spread(layout: QuadLayout, curves: EdgeCurves, sectors: Array, free: BoolArr
     return EdgeCurves(curves.cells, curves.offsets, controls)
 
 
-def _corner_ends(layout: QuadLayout) -> tuple[IntArray, IntArray, IntArray, IntArray]:
+def corner_ends(layout: QuadLayout) -> tuple[IntArray, IntArray, IntArray, IntArray]:
     """For every corner (m, 4) the edge it leaves by, the edge it is reached by, and which end of each is there."""
     ahead, back = layout.quad_edges, np.roll(layout.quad_edges, 1, axis=1)
     ahead_end = layout.edge_reversed.astype(np.int64)
@@ -103,5 +103,5 @@ def _corner_ends(layout: QuadLayout) -> tuple[IntArray, IntArray, IntArray, IntA
 
 def _at_corners(layout: QuadLayout, tips: Array) -> Array:
     """(m, 4, 2, 3) the directions in which the side after and the side before each corner leave it."""
-    ahead, back, ahead_end, back_end = _corner_ends(layout)
+    ahead, back, ahead_end, back_end = corner_ends(layout)
     return np.stack([tips[ahead, ahead_end], tips[back, back_end]], axis=2)

@@ -29,11 +29,3 @@ def test_refinement_is_the_same_curve(coarse, fine):
 def test_spaces_that_are_not_nested_are_refused():
     with pytest.raises(ValueError, match="4 cells do not refine 3"):
         space.refinement(3, 4)
-
-
-def test_interior_fit_recovers_a_member_of_the_space():
-    cells, count = 4, 25
-    control = np.random.default_rng(1).normal(size=cells + 3)
-    basis = space.uniform_collocation(cells, count)
-    rest = basis @ control - basis[:, 0] * control[0] - basis[:, -1] * control[-1]
-    assert np.allclose(space.interior_fit(cells, count) @ rest[1:-1], control[1:-1], atol=1e-12)

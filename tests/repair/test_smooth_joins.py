@@ -1,0 +1,108 @@
+"""Smooth joins and what they stand on: fair fits, shapes of vertices, edges in one line."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from quad_shapes import Marks, SphereTarget, sphere_layout
+
+from patchwright.models.tolerance import Tolerance
+from patchwright.repair.fair_fit import curve_fit, jumps
+from patchwright.repair.joins import corner_normals, regular_edges, seam_angles, sector_normals, side_normals
+from patchwright.repair.patch_fit import Target
+from patchwright.repair.resurface import resurface
+from patchwright.repair.smooth_joins import join, spoiled
+from patchwright.repair.spline_space import greville, uniform_collocation
+from patchwright.repair.stars import leaving
+from patchwright.repair.straight import opposite_ends, straighten
+from patchwright.repair.vertex_shapes import vertex_forms, vertex_normals
+
+
+@pytest.fixture(scope="module")
+def ball():
+    target = SphereTarget()
+    layout = sphere_layout(4)
+    return layout, resurface(layout, Target(target, Marks(target)), Tolerance(1e-9, 1e-4)), target
+
+
+@pytest.mark.parametrize("cells", [2, 3, 8])
+def test_fair_fits_give_cubics_back_whatever_their_pieces(cells):
+    assert np.abs(jumps(cells) @ greville(cells)).max() < 1e-12
+    t = np.linspace(0, 1, 6 * cells + 1)
+    curve = 1 - 2 * t + 3 * t**2 - 4 * t**3
+    from_samples, from_ends = curve_fit(cells, len(t), 1)
+    ends = np.zeros(cells + 3)
+    ends[[0, -1]] = curve[[0, -1]]
+    controls = ends.copy()
+    controls[1:-1] = from_samples @ curve + from_ends @ ends
+    assert np.allclose(uniform_collocation(cells, len(t)) @ controls, curve, atol=1e-12)
+
+
+def test_fair_fits_copy_less_of_the_noise_than_plain_ones():
+    noise = np.random.default_rng(0).standard_normal(97)
+    noise[[0, -1]] = 0.0
+    from_samples, _ = curve_fit(16, 97, 1)
+    plain = np.linalg.pinv(uniform_collocation(16, 97)[:, 1:-1]) @ noise
+    assert np.abs(jumps(16)[:, 1:-1] @ (from_samples @ noise)).max() < np.abs(jumps(16)[:, 1:-1] @ plain).max()
+
+
+@pytest.mark.parametrize("tilt", [0.0, 0.05])
+def test_normals_and_forms_of_a_sphere_are_found_from_a_tilted_guess(ball, tilt):
+    layout, network, target = ball
+    out = layout.vertices[layout.quads]
+    guess = out + tilt * np.cross(out, (0.3, 0.5, 0.8))
+    guess /= np.linalg.norm(guess, axis=-1, keepdims=True)
+    normals = vertex_normals(layout, network.nets, guess, Target(target, Marks(target)))
+    assert np.degrees(np.linalg.norm(normals - out, axis=-1).max()) < 0.1
+    forms = vertex_forms(layout, network.nets, out)
+    flat = np.eye(3) - out[..., :, None] * out[..., None, :]
+    assert np.abs(forms + flat).max() < 0.02  # the height over the plane falls: curvature -1 in every direction
+    assert np.abs(np.einsum("mkij,mkj->mki", forms, out)).max() < 1e-12
+
+
+def test_opposite_edges_leave_regular_vertices_in_one_line(ball):
+    layout, network, _ = ball
+    smooth = np.ones(len(layout.edges), dtype=bool)
+    lined, straight = straighten(layout, network.edges, smooth)
+    opposite = opposite_ends(layout, smooth)
+    legs = leaving(lined).reshape(-1, 3)
+    legs /= np.linalg.norm(legs, axis=1, keepdims=True)
+    ends = np.flatnonzero(straight)
+    assert len(ends) == (opposite >= 0).sum() == 4 * (len(layout.vertices) - 8)
+    assert np.abs(legs[ends] + legs[opposite[ends]]).max() < 1e-12
+    assert (opposite[opposite[ends]] == ends).all()
+
+
+def test_a_disturbed_network_is_made_smooth_and_its_boundaries_stay(ball):
+    layout, network, _ = ball
+    rng = np.random.default_rng(1)
+    groups = []
+    for _, which, nets in network.nets.groups():
+        nets = nets.copy()
+        nets[:, 1:-1, 1:-1] += 1e-3 * rng.standard_normal(nets[:, 1:-1, 1:-1].shape)
+        groups.append((which, nets))
+    rough = type(network.nets).pack(np.asarray(network.nets.cells), groups)
+    room = np.full(len(rough), 1e-3)
+    smooth = join(layout, rough, room)
+    before, after = (seam_angles(layout, side_normals(layout, n)) for n in (rough, smooth))
+    assert np.median(before) > 1.0
+    assert after.max() < 0.1 * np.median(before)
+    assert not spoiled(smooth, rough, room).any()
+    for (_, _, old), (_, _, new) in zip(rough.groups(), smooth.groups(), strict=True):
+        assert (old[:, [0, -1]] == new[:, [0, -1]]).all()
+        assert (old[:, :, [0, -1]] == new[:, :, [0, -1]]).all()
+
+
+def test_fixed_patches_stay_and_their_neighbours_follow(ball):
+    layout, network, _ = ball
+    fixed = np.arange(len(network)) == 7
+    again = join(layout, network.nets, np.full(len(network), 1e-3), fixed)
+    assert (again.nets(np.array([7])) == network.nets.nets(np.array([7]))).all()
+    assert seam_angles(layout, side_normals(layout, again)).max() < 0.1
+
+
+def test_regular_edges_keep_away_from_the_eight_corners_of_the_cube(ball):
+    layout, network, _ = ball
+    count = np.bincount(layout.edges.reshape(-1))
+    assert (regular_edges(layout) == (count[layout.edges] == 4).all(axis=1)).all()
+    assert sector_normals(layout, corner_normals(network.nets)).shape == (len(network), 4, 3)
