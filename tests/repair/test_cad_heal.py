@@ -62,7 +62,7 @@ def volume(again: Assembly) -> float:
     return again.triangulation.volume
 
 
-@pytest.mark.parametrize("share", [1e-3, 1e-2])
+@pytest.mark.parametrize("share", [pytest.param(1e-3, marks=pytest.mark.slow), 1e-2])
 def test_faces_with_pulled_back_trims_are_trimmed_again_and_every_surface_stays(tmp_path, share):
     # planes on opposite sides and a cylinder between others, so that no corner is lost on both its faces
     faces = [pulled_back(f, share * DIAGONAL, 1) if k in PULLED else f for k, f in enumerate(FACES)]
@@ -75,7 +75,7 @@ def test_faces_with_pulled_back_trims_are_trimmed_again_and_every_surface_stays(
     assert volume(again) == pytest.approx(ROUNDED_VOLUME, rel=1e-3)
 
 
-@pytest.mark.parametrize("face", [0, 4, 6])
+@pytest.mark.parametrize("face", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in (4, 6))])
 def test_a_shifted_face_is_put_back_exactly_and_nothing_else_changes(tmp_path, face):
     rng = np.random.default_rng(face)
     vector = rng.normal(size=3)
@@ -169,9 +169,11 @@ def bicubic_sphere(gap: float, count: int = 9):
 @pytest.mark.parametrize(
     ("gap", "patches"),
     [
-        (0.001, bicubic_sphere),
         (0.1, bicubic_sphere),
-        (0.05, lambda gap: [s for b in cube_sphere_patches(gap).bodies for s in b.surfaces]),
+        pytest.param(0.001, bicubic_sphere, marks=pytest.mark.slow),
+        pytest.param(
+            0.05, lambda gap: [s for b in cube_sphere_patches(gap).bodies for s in b.surfaces], marks=pytest.mark.slow
+        ),
     ],
 )
 def test_patches_that_miss_each_other_meet_on_their_surfaces(tmp_path, gap, patches):
