@@ -155,7 +155,7 @@ def bridge(
     triangulation: Triangulation, rims: tuple[Border, ...], singles: list[int], pairs: list[tuple[int, int]]
 ) -> Bridged:
     """Fill the rims `singles` each by itself and join each of `pairs` by a strip; indices count in `rims`."""
-    used = _Edges.of(triangulation)
+    used = _Edges.of(triangulation, [rims[i].vertices for i in singles])
     corners: list[IntArray] = []
     parents: list[IntArray] = []
     bridges: list[Bridge] = []
@@ -196,12 +196,18 @@ class _Edges:
     place: IntArray
 
     @classmethod
-    def of(cls, triangulation: Triangulation) -> _Edges:
+    def of(cls, triangulation: Triangulation, loops: list[IntArray]) -> _Edges:
+        """Of the edges between vertices of some loops."""
         n = len(triangulation.vertices)
-        a = triangulation.triangles.reshape(-1)
-        b = np.roll(triangulation.triangles, -1, axis=1).reshape(-1)
+        asked = np.zeros(n, dtype=np.bool_)
+        for loop in loops:
+            asked[loop] = True
+        near = asked[triangulation.triangles]
+        ahead = np.roll(triangulation.triangles, -1, axis=1)
+        both = near & asked[ahead]
+        a, b = triangulation.triangles[both], ahead[both]
         start, end = np.concatenate([a, b]), np.concatenate([b, a])
-        offsets = np.concatenate([[0], np.cumsum(np.bincount(start, minlength=n))])
+        offsets = np.concatenate([[0], np.cumsum(np.bincount(start, minlength=n))]).astype(np.int64)
         return cls(offsets, end[np.argsort(start, kind="stable")], np.full(n, -1, dtype=np.int64))
 
     def chords(self, loop: IntArray) -> BoolArray:
