@@ -25,6 +25,7 @@ from patchwright.repair.cad_ground import ground_of, measured, on_model, true_en
 from patchwright.repair.decisions import Decisions
 from patchwright.repair.deviation import Deviation
 from patchwright.repair.faceting import faceting
+from patchwright.repair.joins import smooth_edges
 from patchwright.repair.last_resort import wrapped
 from patchwright.repair.mend import BRIDGED, CUT, KEPT, Mended, mend
 from patchwright.repair.mended import LEFT_OUT
@@ -34,6 +35,7 @@ from patchwright.repair.patch_fit import Target
 from patchwright.repair.quad_layout import QuadLayout, quad_layout
 from patchwright.repair.result import Face, LedgerEntry, Point, Problem, Progress, Repaired, Rung, Seam, Verdict
 from patchwright.repair.resurface import resurface
+from patchwright.repair.seam_curvature import curvature_jumps
 from patchwright.repair.symmetry import settled
 from patchwright.repair.true_ground import TrueGround
 
@@ -298,6 +300,9 @@ def _figures(
 ) -> dict[str, float | int | str | bool]:
     """The numbers of the report's first table."""
     smooth = np.array([s.angle for s in seams if s.kind == "smooth"] or [0.0])
+    inner = smooth_edges(network.layout)
+    jumps = (curvature_jumps(network.layout, network.nets) * mended.triangulation.diagonal)[inner]
+    jumps = jumps if len(jumps) else np.zeros(1)
     return {
         "patches": len(network),
         "control points": len(network.nets.controls),
@@ -313,6 +318,9 @@ def _figures(
         "largest smooth seam angle": float(smooth.max()),
         "median smooth seam angle": float(np.median(smooth)),
         "smooth seam angle, 99 %": float(np.percentile(smooth, 99.0)),
+        "largest curvature jump times diagonal": float(jumps.max()),
+        "median curvature jump times diagonal": float(np.median(jumps)),
+        "curvature jump times diagonal, 99 %": float(np.percentile(jumps, 99.0)),
         "volume": mended.triangulation.volume if mended.closed else float("nan"),
     }
 

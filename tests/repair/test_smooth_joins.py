@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from quad_shapes import Marks, SphereTarget, sphere_layout
+from quad_shapes import Marks, SphereTarget, layout_from_quads, sphere_layout
 
 from patchwright.models.tolerance import Tolerance
 from patchwright.repair.fair_fit import curve_fit, jumps
 from patchwright.repair.joins import corner_normals, regular_edges, seam_angles, sector_normals, side_normals
 from patchwright.repair.patch_fit import Target
+from patchwright.repair.patch_nets import PatchNets
 from patchwright.repair.resurface import resurface
+from patchwright.repair.seam_curvature import curvature_jumps, side_curvatures
 from patchwright.repair.smooth_joins import join, spoiled
 from patchwright.repair.spline_space import greville, uniform_collocation
 from patchwright.repair.stars import leaving
@@ -106,3 +108,30 @@ def test_regular_edges_keep_away_from_the_eight_corners_of_the_cube(ball):
     count = np.bincount(layout.edges.reshape(-1))
     assert (regular_edges(layout) == (count[layout.edges] == 4).all(axis=1)).all()
     assert sector_normals(layout, corner_normals(network.nets)).shape == (len(network), 4, 3)
+
+
+@pytest.mark.parametrize("radius", [0.5, 4.0])
+def test_curvatures_across_seams_are_those_of_the_ball(radius):
+    target = SphereTarget(radius)
+    layout = sphere_layout(2, radius)
+    nets = resurface(layout, Target(target, Marks(target)), Tolerance(1e-9, 1e-4 * radius)).nets
+    assert np.abs(side_curvatures(layout, nets) * radius + 1.0).max() < 0.02
+    assert curvature_jumps(layout, nets).max() * radius < 0.02
+
+
+def test_a_jump_of_curvature_is_measured():
+    # a plane that meets the parabola z = k x^2 / 2 along x = 0 with one tangent plane
+    k, t = 3.0, np.linspace(0.0, 1.0, 9)[:, None]
+    corners = np.array([[-1.0, 0, 0], [0, 0, 0], [0, 1, 0], [-1, 1, 0], [1, 0, k / 2], [1, 1, k / 2]])
+    quads = np.array([[0, 1, 2, 3], [1, 4, 5, 2]])
+    layout = layout_from_quads(corners, quads, lambda a, b: (1 - t) * corners[a] + t * corners[b])
+    u = greville(2)
+    flat, bent = np.zeros((5, 5, 3)), np.zeros((5, 5, 3))
+    flat[..., 0], bent[..., 0] = (u - 1.0)[:, None], u[:, None]
+    flat[..., 1] = bent[..., 1] = u[None]
+    sites = np.linspace(0, 1, 5)
+    bent[..., 2] = np.linalg.solve(uniform_collocation(2, 5), 0.5 * k * sites**2)[:, None]
+    nets = PatchNets.pack(np.full((2, 2), 2), [(np.arange(2), np.stack([flat, bent]))])
+    jumps = curvature_jumps(layout, nets)
+    assert jumps.max() == pytest.approx(k, rel=1e-12)
+    assert (jumps > 1e-9).sum() == 1  # the boundaries have none
