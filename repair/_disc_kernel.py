@@ -208,6 +208,22 @@ def make_convex(m, net, d, stamp, limit):
 
 
 @inner
+def quads_at(net, v):
+    """How many quads there are all round a vertex, three at least for one on the boundary, which may have any."""
+    start = net.at[v]
+    h = start
+    count = 0
+    for _ in range(_MOST_TURN):
+        count += 1
+        h = net.twin[preceding(h)]
+        if h < 0:
+            return max(count, 3)
+        if h == start:
+            break
+    return count
+
+
+@inner
 def find_loop(m, net, d, stamp):
     """(is a disc, defect now, defect of its border with the wanted quads): fills `border`, `want`, `loop`, `corner`."""
     quads, vertices = d.size[0], d.size[1]
@@ -234,6 +250,8 @@ def find_loop(m, net, d, stamp):
         before += abs(inside - want)
         if d.border[i] >= 0:
             d.want[i] = min(max(want, 1), 2)
+            if m.kind[d.vertices[i]] == 2 and quads_at(net, d.vertices[i]) - inside + d.want[i] < 3:
+                d.want[i] = 2  # a corner of ridges alone keeps three edges: two quads would share two of theirs
             after += abs(d.want[i] - want)
             if d.want[i] == 1:
                 corners += 1

@@ -286,7 +286,7 @@ def renew(m, g, net, d, s, row, k, least, stretch, relative):
     """Fill the disc by a pattern; whether the quads came out good enough. If not, nothing has changed."""
     new_q, next_v, border = net.used[0], net.used[1], d.size[2]
     rows, new_v = fill(border, d.corner, k, row, s.local)
-    if new_q + rows > len(net.quads) or next_v + new_v - border > len(net.at) or rows > 4 * d.size[0] + 16:
+    if new_q + rows > len(net.quads) or next_v + new_v - border > len(net.at) or 2 * rows > 3 * d.size[0] + 16:
         return False
     region = net.region[d.quads[0]]
     for i in range(border):

@@ -24,6 +24,7 @@ from patchwright.repair._disc_kernel import (
     behind_in_sector,
     note,
     note_vertex,
+    quads_at,
     sector,
     sector_start,
     take_back,
@@ -153,13 +154,6 @@ def defects_at(m, net, d, v):
         if h < 0:
             break
     return total
-
-
-@inner
-def is_doublet(m, net, v):
-    """Whether a free vertex has two quads only, which share both its edges."""
-    h = net.at[v]
-    return m.kind[v] == 0 and net.twin[preceding(h)] >= 0 and net.twin[h] // 4 == net.twin[preceding(h)] // 4
 
 
 @inner
@@ -436,7 +430,7 @@ def zip_up(m, g, net, d, s, limit, least, stretch, most):
             near = np.int64(0)
             for i in range(left):
                 if net.at[touched[i]] >= 0:
-                    good = good and not is_doublet(m, net, touched[i])
+                    good = good and quads_at(net, touched[i]) >= 3
                     near = quads_round(net, d, s, touched[i], near)
             worst, longest = poorest(m, net, s, near)
             good = good and worst >= bound and longest <= far

@@ -178,7 +178,7 @@ def _with_ridges(features: Features, angle: float) -> tuple[Features, Ridges | N
 def _pairs(features: Features, ridges: Ridges | None, target: int | None) -> QuadMesh:
     """Coarse triangles paired, split and made regular; once more with corrected sizes where their number is off."""
     from patchwright.repair.pairing import pair
-    from patchwright.repair.quad_smooth import scaled_jacobians, smooth
+    from patchwright.repair.quad_smooth import smooth
     from patchwright.repair.regular import regularize, unfolded
     from patchwright.repair.remesh import remesh
     from patchwright.repair.sizing import size_field
@@ -187,20 +187,27 @@ def _pairs(features: Features, ridges: Ridges | None, target: int | None) -> Qua
     for _ in range(RETRIES):
         size, wanted = size_field(features, ridges, target=target, factor=factor)
         paired = pair(remesh(features, 2.0 * size))
-        smoothed = paired.copy()
-        smooth(smoothed)
-        quad_mesh = regularize(unfolded(paired, smoothed))
+        quad_mesh = regularize(unfolded(paired))
         ratio = len(quad_mesh.quads) / wanted
         if abs(np.log(ratio)) < error:
-            best, error = (quad_mesh, smoothed), abs(np.log(ratio))
+            best, error = (quad_mesh, paired), abs(np.log(ratio))
         if target is None or error < np.log(NEAR_TARGET):
             break
         factor *= np.sqrt(ratio)
     assert best is not None
-    regular, smoothed = best
+    regular, paired = best
     smooth(regular)
-    # never more folds than the quads as they were paired
-    return min((regular, smoothed), key=lambda mesh: int((scaled_jacobians(mesh) <= 0.0).sum()))
+    if not _folded(regular):
+        return regular
+    smooth(paired)  # never more folds than the quads as they were paired
+    return min((regular, paired), key=_folded)
+
+
+def _folded(quad_mesh: QuadMesh) -> int:
+    """How many quads are turned against the surface."""
+    from patchwright.repair.quad_smooth import scaled_jacobians
+
+    return int((scaled_jacobians(quad_mesh) <= 0.0).sum())
 
 
 def _finish(quad_mesh: QuadMesh, features: Features, begin: float) -> QuadLayout:

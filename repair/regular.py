@@ -22,7 +22,7 @@ PASSES = 2  # with each limit, as long as something changes
 TURNS = 3  # zipping and then filling, as long as something is zipped
 ZIP_LIMIT = 50  # quads of the discs that shall make a zip worth while
 MOST_RISE = 8  # defects more for the time being
-LEAST = 0.1  # scaled Jacobian of new quads, before they are smoothed with all the others
+LEAST = 0.3  # scaled Jacobian of new quads, before they are smoothed with all the others
 STRETCH = 2.0  # longest new edge over the wanted length of coarse triangles, which is twice that of quads
 FOLD_RINGS = 2  # of quads round folded ones that start smoothed
 ROOM = 4  # times the quads and vertices there are: room for those of one pass
@@ -154,16 +154,19 @@ def _room(quads: int, vertices: int, limit: int) -> tuple[Any, Any]:
     return disc, scratch
 
 
-def unfolded(quad_mesh: QuadMesh, smoothed: QuadMesh) -> QuadMesh:
-    """A copy of the quads where those near folded ones lie as in `smoothed`, the same quads smoothed."""
-    from patchwright.repair.quad_smooth import scaled_jacobians, update_outward
+def unfolded(quad_mesh: QuadMesh) -> QuadMesh:
+    """The quads where those near folded ones are smoothed: a copy, or the quads themselves where none is folded."""
+    from patchwright.repair.quad_smooth import scaled_jacobians, smooth, update_outward
 
-    own = quad_mesh.copy()
     near: BoolArray = scaled_jacobians(quad_mesh) <= 0.0
+    if not near.any():
+        return quad_mesh
+    own, smoothed = quad_mesh.copy(), quad_mesh.copy()
+    smooth(smoothed)
     for _ in range(FOLD_RINGS):
         vertices = np.zeros(len(own.mesh.X), dtype=bool)
         vertices[own.quads[near]] = True
-        near = vertices[own.quads].any(axis=1)
+        near = np.asarray(vertices[own.quads].any(axis=1))
     which = np.unique(own.quads[near])
     for mine, other in zip(own.mesh[:8], smoothed.mesh[:8], strict=True):
         mine[which] = other[which]

@@ -148,15 +148,15 @@ def test_what_is_regular_stays():
 
 def test_folded_quads_start_smoothed():
     given = paired(sphere(), 0.4)
-    smoothed = given.copy()
-    smooth(smoothed)
-    assert np.array_equal(unfolded(given, smoothed).mesh.X, given.mesh.X)  # nothing folded, nothing moved
+    assert unfolded(given) is given
     broken = given.copy()
-    pair_of = given.quads[0, :2]
-    broken.mesh.X[pair_of] = given.mesh.X[pair_of[::-1]]
-    whole = unfolded(broken, smoothed)
+    corner, opposite = given.quads[0, [0, 2]]
+    broken.mesh.X[corner] = 1.3 * given.mesh.X[opposite] - 0.3 * given.mesh.X[corner]
+    whole = unfolded(broken)
     assert scaled_jacobians(broken).min() <= 0.0 < scaled_jacobians(whole).min()
-    assert np.array_equal(whole.mesh.X[pair_of], smoothed.mesh.X[pair_of])
+    away = np.linalg.norm(given.mesh.X - given.mesh.X[corner], axis=1) > 1.2
+    assert away.any()
+    assert np.array_equal(whole.mesh.X[away], given.mesh.X[away])
 
 
 def test_a_given_mesh_is_not_changed():
@@ -168,11 +168,11 @@ def test_a_given_mesh_is_not_changed():
 
 
 @pytest.mark.parametrize("scale", [1e-3, 1e3])
-def test_motion_and_scale_leave_as_few(scale):
+def test_blocks_are_large_whatever_the_motion_and_scale(scale):
     shape, _ = moved(wedge(), scale)
-    one, other = quad_layout(wedge(), target=300), quad_layout(shape, target=300)
-    assert other.irregular_vertices <= one.irregular_vertices + 12
-    assert len(find_blocks(other)) <= 2 * len(find_blocks(one))
+    layout = quad_layout(shape, target=300)
+    assert len(layout) > 5 * len(find_blocks(layout))  # pairs alone: between two and three quads a block
+    assert layout.irregular_vertices < 0.12 * len(layout.vertices)  # pairs alone: a sixth of the vertices or more
 
 
 def test_an_ellipsoid_has_the_fewest_there_can_be():
@@ -190,7 +190,7 @@ def test_blocks_of_a_real_blade_are_large(data):
 
     body = read(data("cgal_blade.off")).triangulation
     layout = quad_layout(body)
-    assert len(layout) / len(find_blocks(layout)) > 20.0
+    assert len(layout) > 10 * len(find_blocks(layout))
     assert layout.irregular_vertices < 0.02 * len(layout.vertices)
     assert layout.report.feature_coverage == pytest.approx(1.0, abs=1e-9)
     assert layout.report.folded == 0
