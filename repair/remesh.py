@@ -78,16 +78,6 @@ def remesh(features: Features, size: Array) -> CoarseMesh:
             kernel.flip_pass(mesh, ground, len(mesh.T))
             kernel.smooth_pass(mesh, ground, len(mesh.X), 0.6 if turn < ROUNDS - 1 else 0.9)
     kernel.flip_pass(mesh, ground, len(mesh.T))
-    for _ in range(ROUNDS):
-        n, m = len(mesh.X), len(mesh.T)
-        mesh = _compact(mesh, room=2 * m + 64)
-        *used, changed = kernel.ladder_pass(mesh, ground, n, m, LONGEST)
-        mesh = _compact(mesh, *used)
-        if not changed:
-            break
-        for _ in range(2):
-            kernel.smooth_pass(mesh, ground, len(mesh.X), 0.9)
-            kernel.flip_pass(mesh, ground, len(mesh.T))
     return CoarseMesh(ground, mesh)
 
 
