@@ -1,7 +1,8 @@
 """Quads made square: vertices move over the surface, on their feature curve or not at all, never spoiling a quad.
 
 A plain mean of the neighbours where that does no harm; where a quad is poor, the best place among some tried ones
-(smart Laplacian and pattern search on the least scaled Jacobian round the vertex).
+(smart Laplacian and pattern search). What is bettered is a sum over all corners round the vertex, not the worst alone:
+beside a corner that features hold narrow the others still matter. Short sides count as well as angles.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ ROUNDS = 4  # normals at the quads' centres are renewed between rounds
 EXTRA = 8  # further rounds, near quads poorer than POOR only
 POOR = 0.1
 PASSES = 6  # over all vertices in a round
-GOAL = 0.6  # scaled Jacobian that evening out may go down to
+GOAL = 0.6  # corner quality that evening out may go down to, and from which on no better place is searched for
 
 
 def smooth(quad_mesh: QuadMesh, *, rounds: int = ROUNDS) -> None:
