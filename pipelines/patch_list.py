@@ -20,7 +20,7 @@ Sides go round a patch: south, east, north, west, each in either direction. A si
 from __future__ import annotations
 
 import difflib
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -43,6 +43,7 @@ KINDS: dict[str, set[str]] = {
     "points": {"scheme", "parameters", "laid"}, "section": {"from", "to"}, "edge": set(), "iso": {"from", "to"},
     "meet": {"from", "to"},
 }  # fmt: skip
+SAME = 0.2  # of a side's chord: sides with common ends nearer than this in the middle are one
 CORNER = 0.01  # of the diagonal: sides of a list may miss each other by this much at a corner; both are moved there
 
 
@@ -106,7 +107,38 @@ def load_patches(path: Path, model: Assembly, tolerance: float | None = None) ->
         except GeometryError as error:
             raise type(error)(f"{path}: patch {name!r}: {error}") from None
         patches.append(PatchSpec(name, sides, shared | _options(path, entry)))
-    return PatchList(tuple(patches), fit, note)
+    return PatchList(tuple(_joined(patches, fit)), fit, note)
+
+
+def _joined(patches: list[PatchSpec], tolerance: float) -> list[PatchSpec]:
+    """The patches with common sides as one curve: sides laid on the geometry from both patches differ between the ends.
+
+    A side takes the curve of an earlier one with the same ends whose middle is no farther off than `SAME` of its chord.
+    """
+    known: list[Side] = []
+    out = []
+    for patch in patches:
+        own = {}
+        for name in SIDES:
+            side = getattr(patch.sides, name)
+            for other in known:
+                same = next((way for way in (other, other.reversed) if _alike(side, way, tolerance)), None)
+                if same is not None:
+                    own[name] = same
+                    break
+            else:
+                known.append(side)
+        out.append(replace(patch, sides=replace(patch.sides, **own)) if own else patch)
+    return out
+
+
+def _alike(side: Side, other: Side, tolerance: float) -> bool:
+    """Whether two sides are meant to be one curve."""
+    if np.linalg.norm(side.ends - other.ends, axis=1).max() > tolerance:
+        return False
+    middles = [s.at(np.array([0.5]))[0] for s in (side, other)]
+    length = float(np.linalg.norm(side.ends[1] - side.ends[0]))
+    return bool(np.linalg.norm(middles[0] - middles[1]) <= SAME * length)
 
 
 def _allowed(limits: Tolerance, ground: PatchGround, model: Assembly) -> tuple[float, str]:

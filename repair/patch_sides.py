@@ -19,8 +19,8 @@ from patchwright.models.interpolation import interpolate
 from patchwright.models.interpolation.parameters import Wanted
 from patchwright.models.nurbs_curve import NurbsCurve
 from patchwright.repair.coons import check_corners, coons_grid, offset_distance
-from patchwright.repair.probes import SIDE, Probes
-from patchwright.repair.projection import Ground, project
+from patchwright.repair.probes import SIDE, Probes, line_directions
+from patchwright.repair.projection import FACING, Ground, project
 
 if TYPE_CHECKING:
     from patchwright.models.assembly import Assembly
@@ -171,9 +171,11 @@ def laid(
     offset: float | None = None,
     hits: str = "nearest",
 ) -> Sides:
-    """Sides drawn over a geometry, moved onto it: C2 cubics through the points found along the patch's normals.
+    """Sides drawn over a geometry, moved onto it: C2 cubics through the points found along the geometry's normals.
 
-    Over a gap, where nothing is found, the cubic runs on between the points on both sides of it.
+    The directions are those at the closest points, so that a side two patches have in common is the same for both;
+    where these face away from the patch its own normal is taken. Over a gap, where nothing is found, the cubic runs on
+    between the points on both sides of it.
 
     Parameters
     ----------
@@ -207,6 +209,9 @@ def _border(grid: Array) -> tuple[Array, Array, Array, Array]:
 
 
 def _laid(side: Side, drawn: Array, normal: Array, ground: Ground, reach: float, which: str) -> Side:
+    below = ground.triangulation.normals[ground.closest(drawn).triangle]
+    with_patch = np.einsum("ij,ij->i", below, normal) > FACING
+    normal = line_directions(drawn, np.where(with_patch[:, None], below, normal), reach)
     hits = project(drawn, normal, np.full(len(drawn), reach), ground, outermost=which == "outermost")
     points, found = np.array(hits.points), np.array(hits.hit)
     ends = ground.closest(drawn[[0, -1]])

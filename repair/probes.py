@@ -41,6 +41,24 @@ class Probes:
         return np.asarray(out / np.linalg.norm(out, axis=-1, keepdims=True))
 
 
+def line_directions(points: Array, directions: Array, distance: float) -> Array:
+    """Unit directions (n, 3) for probes from the points of a line, smoothed as little as may be so that none cross."""
+    from scipy.ndimage import gaussian_filter1d
+
+    out, width = directions, 1.0
+    step = np.diff(points, axis=0)
+    size = np.einsum("ij,ij->i", step, step)
+    while width <= len(points):
+        closing = np.abs(np.einsum("ij,ij->i", step, distance * np.diff(out, axis=0)))
+        if not (closing > (1.0 - CLEAR) * size).any():
+            break
+        out = gaussian_filter1d(directions, width, axis=0, mode="nearest")
+        length = np.linalg.norm(out, axis=1, keepdims=True)
+        out = np.divide(out, length, out=np.array(directions), where=length > 1e-6)
+        width *= 1.5
+    return np.asarray(out)
+
+
 def _along(values: Array, at: Array) -> Array:
     """Linear interpolation along the first axis."""
     place = np.clip(at, 0.0, 1.0) * (len(values) - 1)
