@@ -160,7 +160,7 @@ def with_end_tangents(edges: EdgeCurves, normals: Array, second: Array, fixed: B
     return EdgeCurves.pack(np.asarray(edges.cells), groups)
 
 
-def with_end_bends(edges: EdgeCurves, normals: Array, bends: Array, bent: BoolArray, most: float) -> EdgeCurves:
+def with_end_bends(edges: EdgeCurves, normals: Array, bends: Array, bent: BoolArray, most: Array) -> EdgeCurves:
     """The curves with given normal curvatures at some of their ends; ends and end tangents stay.
 
     Parameters
@@ -168,7 +168,7 @@ def with_end_bends(edges: EdgeCurves, normals: Array, bends: Array, bent: BoolAr
     normals : (e, 2, 3) unit surface normals at the start and end of each edge
     bends : (e, 2) the wanted normal curvatures, 1 over length, positive where the curve bends towards the normal
     bent : (e, 2) the ends to change; of curves of fewer than three pieces only one end has room, the first is taken
-    most : length no control point moves farther than; a curve that would have to keeps a part of its own curvatures
+    most : (e,) length no control point moves farther than; a curve that would have to keeps a part of its curvatures
 
     The change is the least in the mean square along the curve.
     """
@@ -191,12 +191,15 @@ def with_end_bends(edges: EdgeCurves, normals: Array, bends: Array, bent: BoolAr
             force = np.linalg.solve(mutual, missing[..., None]) * active[..., None]
             move = np.einsum("ie,ked->kid", reply, force * normal)
             size = np.linalg.norm(move, axis=2).max(axis=1)
-            points[:, 2:-2] += np.minimum(1.0, most / np.maximum(size, most))[:, None, None] * move
+            share = np.divide(most[which], size, out=np.ones_like(size), where=size > most[which])
+            points[:, 2:-2] += share[:, None, None] * move
         groups.append((which, points))
     return EdgeCurves.pack(np.asarray(edges.cells), groups)
 
 
-def with_tips(edges: EdgeCurves, tips: Array, groups: list[tuple[IntArray, Array]], least: float) -> EdgeCurves:
+def with_tips(
+    edges: EdgeCurves, tips: Array, groups: list[tuple[IntArray, Array]], least: float, most: Array
+) -> EdgeCurves:
     """The curves fitted anew to samples, ends held and end tangents free in length alone; others stay.
 
     Parameters
@@ -204,6 +207,7 @@ def with_tips(edges: EdgeCurves, tips: Array, groups: list[tuple[IntArray, Array
     tips : (e, 2, 3) unit directions in which each curve leaves its start and its end
     groups : (edge indices, (k, count, 3) samples at equidistant parameters); each group shares its cell count
     least : share of its present length below which no leg of the control polygon falls
+    most : (e, 2) lengths above which the legs do not get, no less than the present ones
     """
     controls = edges.controls.copy()
     for which, samples in groups:
@@ -228,8 +232,8 @@ def with_tips(edges: EdgeCurves, tips: Array, groups: list[tuple[IntArray, Array
         right[:, 2:] = rest[:, 2:-2].reshape(len(which), n - 2)
         found = np.linalg.solve(matrix, right[..., None])[..., 0]
         present = np.linalg.norm(points[:, legs] - points[:, [0, -1]], axis=-1)
-        length = np.maximum(found[:, :2], least * present)
-        if (length > found[:, :2]).any():  # the inner points answer to the lengths as they are
+        length = np.clip(found[:, :2], least * present, most[which])
+        if (length != found[:, :2]).any():  # the inner points answer to the lengths as they are
             right = right[:, 2:] - np.einsum("kej,ke->kj", mixed, length)
             found[:, 2:] = np.linalg.solve(matrix[:, 2:, 2:], right[..., None])[..., 0]
         points[:, legs] = points[:, [0, -1]] + length[..., None] * tip

@@ -22,6 +22,7 @@ from patchwright.repair.edge_curves import (
     with_tips,
 )
 from patchwright.repair.joins import corner_normals, edge_end_normals, sector_normals, smooth_edges
+from patchwright.repair.leg_room import leg_room
 from patchwright.repair.patch_fit import Target
 from patchwright.repair.patch_nets import PatchNets
 from patchwright.repair.quad_layout import QuadLayout
@@ -60,7 +61,7 @@ class VertexShapes:
         smooth = smooth_edges(layout)
         flat = with_end_tangents(edges, *edge_end_normals(layout, sectors), np.zeros(len(layout.edges), dtype=bool))
         open_ = spread(layout, flat, sectors, smooth)
-        lined, straight = straighten(layout, open_, smooth)
+        lined, straight = straighten(layout, open_, smooth, sectors)
         legs = leaving(lined)
         length = np.linalg.norm(legs, axis=-1, keepdims=True)
         tips = np.divide(legs, length, out=np.zeros_like(legs), where=length > 0)
@@ -88,11 +89,15 @@ class VertexShapes:
     def settled(self, layout: QuadLayout, curves: EdgeCurves, target: Target, most: float) -> EdgeCurves:
         """The curves with their ends as they owe them and, where smooth, fitted to the target again.
 
-        `most` is the length a curve may move for the sake of its curvatures.
+        `most` is the length a curve may move for the sake of its curvatures; beside slim patches it moves less, and
+        legs that are turned are only as long as they have room (`leg_room`).
         """
         controls = curves.controls.copy()
-        legs = leaving(curves)
-        along = np.maximum((legs * self.tips).sum(axis=-1), LEAST_LEG * np.linalg.norm(legs, axis=-1))
+        legs, room = leaving(curves), leg_room(layout, curves)
+        aside = np.linalg.norm(np.cross(legs, self.tips), axis=-1)
+        size = np.linalg.norm(legs, axis=-1)
+        longest = np.divide(room * size, aside, out=np.full_like(room, np.inf), where=aside > 0.0)
+        along = np.minimum(np.maximum((legs * self.tips).sum(axis=-1), LEAST_LEG * size), longest)
         first, last = curves.offsets[:-1], curves.offsets[1:] - 1
         controls[first + 1] = controls[first] + along[:, 0, None] * self.tips[:, 0]
         controls[last - 1] = controls[last] + along[:, 1, None] * self.tips[:, 1]
@@ -104,7 +109,8 @@ class VertexShapes:
                 samples = uniform_collocation(cells, SAMPLES_PER_CELL * cells + 1) @ some
                 groups.append((on, target.tree.closest(samples.reshape(-1, 3)).points.reshape(samples.shape)))
         normals, _ = edge_end_normals(layout, self.sectors)
-        return with_end_bends(with_tips(directed, self.tips, groups, LEAST_LEG), normals, self.bends, self.bent, most)
+        fitted = with_tips(directed, self.tips, groups, LEAST_LEG, longest)
+        return with_end_bends(fitted, normals, self.bends, self.bent, np.minimum(most, room.min(axis=1)))
 
 
 def fit_edge_curves(layout: QuadLayout, target: Target, cells: IntArray) -> EdgeCurves:

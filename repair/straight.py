@@ -8,12 +8,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from patchwright.models.arrays import BoolArray, IntArray
+from patchwright.models.arrays import Array, BoolArray, IntArray
 from patchwright.repair.edge_curves import EdgeCurves
+from patchwright.repair.leg_room import leg_room
 from patchwright.repair.quad_layout import QuadLayout
-from patchwright.repair.stars import corner_ends, leaving
+from patchwright.repair.stars import LEAST_CORNER, corner_angles, corner_ends, leaving
 
 MOST_BEND = 0.5  # cosine of 60 degrees: edges that bend more at a vertex are not one line
+ALLOWANCE = 0.1  # degrees by which a corner may miss what it should have
 
 
 def next_ends(layout: QuadLayout, smooth: BoolArray) -> IntArray:
@@ -37,25 +39,57 @@ def opposite_ends(layout: QuadLayout, smooth: BoolArray) -> IntArray:
     return np.where((fourth == own) & (second != own), second, -1)
 
 
-def straighten(layout: QuadLayout, curves: EdgeCurves, smooth: BoolArray) -> tuple[EdgeCurves, BoolArray]:
+def straighten(
+    layout: QuadLayout, curves: EdgeCurves, smooth: BoolArray, sectors: Array
+) -> tuple[EdgeCurves, BoolArray]:
     """The curves with the tangents of opposite edges in one line, and (2 e,) which ends are.
 
-    Both tangents keep their lengths and turn by the same angle; those that bend by more than 60 degrees stay.
+    Parameters
+    ----------
+    sectors : (m, 4, 3) unit normals at the corners, zero at cusps
+
+    Both tangents keep their lengths and share the turn evenly, or as far as `leg_room` lets each of them go. Left as
+    they are: ends that bend by more than 60 degrees or have no room for the turn between them, and all ends at a vertex
+    where a corner would be narrower than `LEAST_CORNER`, or nearer to 180 degrees than that, and worse than it was.
     """
     opposite = opposite_ends(layout, smooth)
     leg = leaving(curves).reshape(-1, 3)
-    length = np.linalg.norm(leg, axis=1, keepdims=True)
-    unit = np.divide(leg, length, out=np.zeros_like(leg), where=length > 0)
-    other = unit[opposite]
-    straight = (opposite >= 0) & ((unit * other).sum(axis=1) <= -MOST_BEND)
-    line = unit - other
-    line /= np.maximum(np.linalg.norm(line, axis=1, keepdims=True), np.finfo(float).tiny)
+    length = np.linalg.norm(leg, axis=1)
+    unit = np.divide(leg, length[:, None], out=np.zeros_like(leg), where=length[:, None] > 0)
+    onward = -unit[opposite]
+    along = (unit * onward).sum(axis=1)
+    aside = onward - along[:, None] * unit
+    size = np.linalg.norm(aside, axis=1)
+    bend = np.arctan2(size, along)
+    sine = np.divide(leg_room(layout, curves).reshape(-1), length, out=np.ones_like(length), where=length > 0)
+    most = np.arcsin(np.minimum(1.0, sine))
+    straight = (opposite >= 0) & (along >= MOST_BEND) & (most + most[opposite] >= bend)
+    turn = np.clip(0.5 * bend, np.minimum(bend - most[opposite], 0.5 * bend), most)[:, None]
+    aside = np.divide(aside, size[:, None], out=np.zeros_like(aside), where=size[:, None] > 0)
+    line = np.cos(turn) * unit + np.sin(turn) * aside
+    straight &= ~_closed(layout, unit, np.where(straight[:, None], line, unit), sectors)
     controls = curves.controls.copy()
     ends = np.flatnonzero(straight)
     edge, end = ends // 2, ends % 2
     tip = np.where(end == 0, curves.offsets[edge], curves.offsets[edge + 1] - 1)
-    controls[tip + np.where(end == 0, 1, -1)] = controls[tip] + (length * line)[ends]
+    controls[tip + np.where(end == 0, 1, -1)] = controls[tip] + (length[:, None] * line)[ends]
     return EdgeCurves(curves.cells, curves.offsets, controls), straight
+
+
+def _closed(layout: QuadLayout, before: Array, after: Array, sectors: Array) -> BoolArray:
+    """(2 e,) ends at vertices where directions `after` (2 e, 3) leave a corner that is no more open, `before` did not.
+
+    A corner is open between `LEAST_CORNER` and 180 degrees less that; one that was less open already may stay so.
+    """
+    known = (sectors != 0.0).any(axis=2)
+    short = []
+    for tips in (before, after):
+        angle = corner_angles(layout, tips.reshape(-1, 2, 3), sectors)
+        short.append(np.maximum(LEAST_CORNER - angle, angle - (180.0 - LEAST_CORNER)))
+    bad = known & (short[1] > ALLOWANCE) & (short[1] > short[0] + ALLOWANCE)
+    closed = np.zeros(len(layout.vertices), dtype=bool)
+    closed[layout.quads[bad]] = True
+    return np.asarray(closed[layout.edges].reshape(-1))
 
 
 def bent_ends(layout: QuadLayout, smooth: BoolArray, straight: BoolArray) -> BoolArray:

@@ -65,7 +65,7 @@ def test_normals_and_forms_of_a_sphere_are_found_from_a_tilted_guess(ball, tilt)
 def test_opposite_edges_leave_regular_vertices_in_one_line(ball):
     layout, network, _ = ball
     smooth = np.ones(len(layout.edges), dtype=bool)
-    lined, straight = straighten(layout, network.edges, smooth)
+    lined, straight = straighten(layout, network.edges, smooth, layout.vertices[layout.quads])
     opposite = opposite_ends(layout, smooth)
     legs = leaving(lined).reshape(-1, 3)
     legs /= np.linalg.norm(legs, axis=1, keepdims=True)
