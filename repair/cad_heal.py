@@ -17,12 +17,12 @@ from patchwright.models.cad.sewing import sew
 from patchwright.models.cad.status import brep_status
 from patchwright.models.errors import EngineError
 from patchwright.repair.cad_draft import Attempt, Change, Draft, Limits
-from patchwright.repair.face_steps import built, folds, in_vain, mended_faces, widest
+from patchwright.repair.face_steps import built, folds, free_edges, in_vain, mended_faces, widest
 from patchwright.repair.free_edges import on_own_surfaces
 from patchwright.repair.loose_seams import opened
 from patchwright.repair.realign import realign
 from patchwright.repair.retrim import retrim
-from patchwright.repair.seam_join import COARSE, join_seams
+from patchwright.repair.seam_join import COARSE, FINE, join_seams
 from patchwright.repair.side_strip import strip_sides
 from patchwright.repair.strip import strip
 
@@ -38,6 +38,17 @@ class Healed:
     opened: int
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _Together:
+    """`Healed` by bringing faces together; `early` is the largest reach of seams joined before faces are put back."""
+
+    assembly: Assembly
+    changes: tuple[Change, ...] = ()
+    failed: tuple[Attempt, ...] = ()
+    opened: int = 0
+    early: float = 0.0
+
+
 def heal(model: Assembly, limits: Limits, folded: Collection[int] = ()) -> Healed | None:
     """A sewn model with its bad faces mended and its open and loose seams closed as far as the rungs reach.
 
@@ -49,43 +60,70 @@ def heal(model: Assembly, limits: Limits, folded: Collection[int] = ()) -> Heale
     model, changes, failed = mended_faces(model, limits, folded)
     apart = 0
     if not limits.expired:
-        model, done, missed, apart = _brought_together(model, limits)
-        changes, failed = (*changes, *done), (*failed, *missed)
+        together = _brought_together(model, limits)
+        model, apart = together.assembly, together.opened
+        changes, failed = (*changes, *together.changes), (*failed, *together.failed)
     return Healed(model, changes, failed, apart) if changes or failed else None
 
 
-def _brought_together(model: Assembly, limits: Limits) -> tuple[Assembly, tuple[Change, ...], tuple[Attempt, ...], int]:
-    """Open and loose seams closed; where the result of all rungs does not hold, with fewer of them.
+def _brought_together(model: Assembly, limits: Limits) -> _Together:
+    """Open and loose seams closed, in the order that leaves the fewest free edges, then the narrowest seams.
 
-    First without the surfaces' crossings, then only the seams that the file's own precision left open.
+    A face displaced by little is in reach of its neighbours: joining may trim it where it is before it is put back. A
+    crude trim is no counterpart for a displaced face until it is joined. So where one order leaves free edges after
+    seams that the other would join later, both are tried.
     """
     assert model.topology is not None
     draft, apart, gap = opened(Draft(model, model.topology), limits)
     if not (draft.topology.use_counts() == 1).any():
-        return model, (), (), 0
-    draft, joined = join_seams(draft, limits)
+        return _Together(model)
+    widest_kept = max(2.0 * limits.on, gap)
+    best = _in_order(model, draft, limits, widest_kept, FINE, COARSE)
+    if free_edges(best.assembly) and best.early > FINE[0] * limits.diagonal and not limits.expired:
+        other = _in_order(model, draft, limits, widest_kept, FINE[:1], (*FINE[1:], *COARSE))
+        best = min(best, other, key=lambda one: (free_edges(one.assembly), max(widest(one.assembly), limits.fit)))
+    return replace(best, opened=apart if best.changes else 0)
+
+
+def _in_order(
+    model: Assembly,
+    draft: Draft,
+    limits: Limits,
+    gap: float,
+    before: tuple[float, ...],
+    after: tuple[float, ...],
+) -> _Together:
+    """Seams joined at some reaches before displaced faces are put back, at others after it, no seam wider than `gap`.
+
+    Where the result of all rungs does not hold, with fewer of them: first without the surfaces' crossings, then only
+    the seams joined before.
+    """
+    draft, joined = join_seams(draft, limits, before)
+    early = max((change.tolerance for change in joined), default=0.0)
     draft = replace(draft, topology=welded(draft.topology, 2.0 * limits.on))
     tried = {0}
     failed: tuple[Attempt, ...] = ()
-    for rungs in (_climbed, partial(_climbed, crossing=False), _no_rung):
+    for rungs in (partial(_climbed, after=after), partial(_climbed, after=after, crossing=False), _no_rung):
         mended, more = rungs(draft, limits)
         changes = (*joined, *more)
         if len(changes) in tried:
             continue
         tried.add(len(changes))
         mended, drawn = on_own_surfaces(mended, limits)
-        made = _closed(model, mended, limits, max(2.0 * limits.on, gap))
+        made = _closed(model, mended, limits, gap)
         if made is not None:
-            return made, (*changes, *drawn), (), apart
+            return _Together(made, (*changes, *drawn), early=early)
         failed = in_vain("faces brought together", changes, "its seams gape or its faces fold or became invalid")
-    return model, (), failed, 0
+    return _Together(model, failed=failed, early=early)
 
 
 def _no_rung(draft: Draft, limits: Limits) -> tuple[Draft, tuple[Change, ...]]:
     return draft, ()
 
 
-def _climbed(draft: Draft, limits: Limits, crossing: bool = True) -> tuple[Draft, tuple[Change, ...]]:
+def _climbed(
+    draft: Draft, limits: Limits, after: tuple[float, ...], crossing: bool = True
+) -> tuple[Draft, tuple[Change, ...]]:
     """All rungs in order: least change first, and what is certain before what is likely."""
     draft, changes = retrim(draft, limits, crossing=False)
     draft, put_back = realign(draft, limits)
@@ -94,7 +132,7 @@ def _climbed(draft: Draft, limits: Limits, crossing: bool = True) -> tuple[Draft
         draft, again = retrim(draft, limits, crossing=False)
         moved_back = {face for change in put_back for face in change.faces}
         changes = (*changes, *put_back, *(c for c in again if not moved_back & set(c.faces)))
-    draft, joined = join_seams(draft, limits, COARSE)
+    draft, joined = join_seams(draft, limits, after)
     changes = (*changes, *joined)
     if crossing:
         draft, crossed = retrim(draft, limits)

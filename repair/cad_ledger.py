@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from patchwright.models.assembly import Assembly
 from patchwright.repair.cad_draft import Attempt, Change
-from patchwright.repair.cad_outcome import Outcome, free_edges, point
+from patchwright.repair.cad_outcome import Outcome, point
 from patchwright.repair.deadline import Deadline
 from patchwright.repair.diagnosis import Diagnosis
+from patchwright.repair.face_steps import free_edges
 from patchwright.repair.mended import LEFT_OUT
 from patchwright.repair.result import LedgerEntry, Rung
 

@@ -14,8 +14,6 @@ from patchwright.repair.cad_heal import Healed
 from patchwright.repair.decisions import Candidate
 from patchwright.repair.result import Point
 
-POINT = 1e-9  # of the diagonal: an edge this short is a pole
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Filled:
@@ -53,15 +51,6 @@ class Outcome:
     def in_vain(self) -> tuple[Attempt, ...]:
         """All that was tried in vain."""
         return (*(self.healed.failed if self.healed is not None else ()), *self.failed)
-
-
-def free_edges(assembly: Assembly) -> int:
-    """Edges one face uses once, poles left out; the number of parts where no topology is known."""
-    topology = assembly.topology
-    if topology is None:
-        return len(assembly.parts)
-    lengths = np.array([np.ptp(c(np.linspace(*c.domain, 5)), axis=0).max() for c in topology.curves])
-    return int(((topology.use_counts() == 1) & (lengths > POINT * assembly.diagonal)).sum())
 
 
 def point(where: Array | Point) -> Point:

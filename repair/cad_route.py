@@ -17,13 +17,14 @@ from patchwright.repair.cad_draft import Change
 from patchwright.repair.cad_fill import bridged, closed
 from patchwright.repair.cad_grid import cad_grid
 from patchwright.repair.cad_ledger import LEFT, ledger_of
-from patchwright.repair.cad_outcome import Outcome, free_edges, point
+from patchwright.repair.cad_outcome import Outcome, point
 from patchwright.repair.cad_sew import healed, sewn
 from patchwright.repair.deadline import Deadline
 from patchwright.repair.decisions import Decisions
 from patchwright.repair.deviation import two_sided
 from patchwright.repair.diagnosing import diagnose
 from patchwright.repair.diagnosis import Defect, Diagnosis
+from patchwright.repair.face_steps import free_edges
 from patchwright.repair.result import Face, LedgerEntry, Problem, Progress, Repaired, Rung, Seam, Verdict
 from patchwright.repair.weld import weld
 

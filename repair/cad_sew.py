@@ -17,9 +17,9 @@ from patchwright.models.cad.sewing import free_edge_curve, sew
 from patchwright.models.errors import EngineError
 from patchwright.repair.cad_draft import LOOSE_SHARE, SECONDS, Draft, Limits
 from patchwright.repair.cad_heal import heal
-from patchwright.repair.cad_outcome import Outcome, free_edges
+from patchwright.repair.cad_outcome import Outcome
 from patchwright.repair.deadline import Deadline
-from patchwright.repair.face_steps import widest
+from patchwright.repair.face_steps import free_edges, widest
 from patchwright.repair.retrace import retrace
 
 SHARES = np.array([1e-8, 1e-7, 1e-6, 1e-5, 1e-4])  # of the diagonal: sewing tolerances tried, smallest first

@@ -9,6 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable, Collection
 from dataclasses import replace
 
+import numpy as np
+
 from patchwright.models.assembly import Assembly
 from patchwright.models.cad.editing import compacted, with_loops
 from patchwright.models.cad.rebuild import rebuilt
@@ -23,6 +25,7 @@ from patchwright.repair.turned_loops import turned_loops
 
 CHECK, BUILD = 60.0, 120.0  # seconds for the kernel's check of all faces and for building them, where the time is left
 AGAIN = 3  # rounds in which faces that became invalid get back what they had
+POINT = 1e-9  # of the diagonal: an edge this short is a pole
 FOLD = 179.0  # degrees between outward normals: two faces that lie on each other
 
 Changes = tuple[Change, ...]
@@ -73,6 +76,15 @@ def bad_faces(model: Assembly, limits: Limits) -> set[int]:
 def widest(model: Assembly) -> float:
     """The largest gap of any seam."""
     return max((seam.gap for seam in measure_seams(model)), default=0.0)
+
+
+def free_edges(assembly: Assembly) -> int:
+    """Edges one face uses once, poles left out; the number of parts where no topology is known."""
+    topology = assembly.topology
+    if topology is None:
+        return len(assembly.parts)
+    lengths = np.array([np.ptp(c(np.linspace(*c.domain, 5)), axis=0).max() for c in topology.curves])
+    return int(((topology.use_counts() == 1) & (lengths > POINT * assembly.diagonal)).sum())
 
 
 def folds(model: Assembly) -> int:

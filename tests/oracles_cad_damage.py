@@ -10,6 +10,7 @@ from OCP.BRepAdaptor import BRepAdaptor_Curve
 from OCP.BRepAlgoAPI import BRepAlgoAPI_Cut
 from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeEdge, BRepBuilderAPI_MakeFace, BRepBuilderAPI_MakeWire
 from OCP.BRepBuilderAPI import BRepBuilderAPI_Transform as Transform
+from OCP.BRepCheck import BRepCheck_Analyzer
 from OCP.BRepFilletAPI import BRepFilletAPI_MakeFillet
 from OCP.BRepGProp import BRepGProp
 from OCP.BRepOffsetAPI import BRepOffsetAPI_MakePipe
@@ -125,6 +126,22 @@ def written(path: Path, faces, damaged) -> Path:
     writer.Transfer(whole, STEPControl_StepModelType.STEPControl_AsIs)
     writer.Write(str(path))
     return path
+
+
+def ring_of(faces, middle: int) -> list[int]:
+    """Numbers of the faces that share an edge with one of them, its own among them."""
+    edges = parts_of(faces[middle], TopAbs_ShapeEnum.TopAbs_EDGE)
+    rows = [parts_of(face, TopAbs_ShapeEnum.TopAbs_EDGE) for face in faces]
+    return [k for k, row in enumerate(rows) if any(a.IsSame(b) for a in row for b in edges)]
+
+
+def solid_volume(shape) -> float:
+    """The volume of the one solid of a shape that the kernel calls valid, by its exact surfaces."""
+    (solid,) = parts_of(shape, TopAbs_ShapeEnum.TopAbs_SOLID)
+    assert BRepCheck_Analyzer(solid).IsValid()
+    properties = GProp_GProps()
+    BRepGProp.VolumeProperties_s(solid, properties, 1e-12)
+    return properties.Mass()
 
 
 def loosest(shape) -> float:

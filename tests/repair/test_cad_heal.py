@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox, BRepPrimAPI_MakeCylinder
 from oracles_cad_damage import (
     ROUNDED_VOLUME,
     SIZES,
@@ -14,9 +15,11 @@ from oracles_cad_damage import (
     loosest,
     pulled_back,
     read_shape,
+    ring_of,
     rounded_box,
     shifted,
     shrunk,
+    solid_volume,
     turned,
     written,
 )
@@ -102,6 +105,46 @@ def test_three_turned_faces_are_put_back(tmp_path):
     is_sound(again, tmp_path / "healed.step")
     assert len(identical(result, before)) >= len(FACES) - 3
     assert volume(again) == pytest.approx(ROUNDED_VOLUME, rel=1e-3)
+
+
+@pytest.mark.parametrize("apart", [1e-3, -1e-3])
+def test_a_cylinder_whose_caps_are_apart_is_one_valid_solid(tmp_path, apart):
+    height = 3.0
+    faces = faces_of(BRepPrimAPI_MakeCylinder(1.0, height).Shape())
+    side = [np.sign(round(centre(face).Z() - 0.5 * height, 6)) for face in faces]
+    lift = apart * np.sqrt(4.0 + 4.0 + height**2)
+    moved = [shifted(face, (0, 0, s * lift)) if s else face for face, s in zip(faces, side, strict=True)]
+    result, again = healed(written(tmp_path / "caps.step", moved, set(np.flatnonzero(side).tolist())), tmp_path)
+    is_sound(again, tmp_path / "healed.step")
+    assert max(s.gap for s in measure_seams(again)) <= 1e-9 * again.diagonal
+    assert solid_volume(read_shape(tmp_path / "healed.step")) == pytest.approx(height * np.pi, rel=1e-9)
+    assert [e.largest_move for e in result.ledger if e.rung == Rung.REALIGN] == pytest.approx(2 * [abs(lift)], rel=1e-6)
+
+
+@pytest.mark.parametrize("face", [0, 3, *(pytest.param(k, marks=pytest.mark.slow) for k in (1, 2, 4, 5))])
+def test_a_box_with_one_face_tilted_is_one_valid_solid(tmp_path, face):
+    faces = faces_of(BRepPrimAPI_MakeBox(*SIZES).Shape())
+    # about an axis in the face, so that it leaves its neighbours, and about an oblique one
+    for axis in (np.eye(3)[(face // 2 + 1) % 3], np.array([1.0, 2.0, 3.0])):
+        tilted = [turned(f, axis, 0.005) if k == face else f for k, f in enumerate(faces)]
+        _, again = healed(written(tmp_path / "tilted.step", tilted, {face}), tmp_path)
+        is_sound(again, tmp_path / "healed.step")
+        assert max(s.gap for s in measure_seams(again)) <= 1e-9 * again.diagonal
+        assert solid_volume(read_shape(tmp_path / "healed.step")) == pytest.approx(np.prod(SIZES), rel=1e-9)
+        assert np.abs(again.bounds - [np.zeros(3), SIZES]).max() <= 1e-9
+
+
+def test_a_face_turned_within_reach_of_its_neighbours_is_put_back_and_not_trimmed_where_it_is(data, tmp_path):
+    # a face among its neighbours: what is free on the undamaged part is all that may be free
+    shape = faces_of(read_shape(data("featuretype.step")))
+    ring = ring_of(shape, 20)
+    faces = [shape[k] for k in ring]
+    whole = read(written(tmp_path / "whole.step", faces, set()))
+    at = ring.index(20)
+    faces[at] = turned(faces[at], (0.02, -0.98, -0.19), 0.005)
+    _, again = healed(written(tmp_path / "turned.step", faces, {at}), tmp_path)
+    assert (again.topology.use_counts() == 1).sum() == (whole.topology.use_counts() == 1).sum()
+    assert max(s.gap for s in measure_seams(again)) <= 1e-9 * again.diagonal
 
 
 def test_a_face_that_fits_nowhere_is_trimmed_where_it_crosses_its_neighbours(tmp_path):
