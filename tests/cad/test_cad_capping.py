@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from oracles_cad import network
 
-from patchwright.models import Tolerance
+from patchwright.models import Plane, Tolerance
 from patchwright.models.cad.capping import cap, free_loops, reason_against
 from patchwright.models.cad.seams import measure_seams
 from patchwright.models.errors import GeometryError, ParameterError
@@ -119,13 +119,14 @@ def test_repair_closes_planar_openings_and_the_file_holds_a_solid(tmp_path):
     assert len(again.parts) == 6
 
 
-def test_repair_refuses_to_close_a_wavy_opening_and_says_where(tmp_path):
+def test_repair_fills_a_wavy_opening_by_a_bent_face_and_the_flat_one_by_a_plane(tmp_path):
     write(tmp_path / "wavy.step", network(tube(warp=0.1)))
     model = read(tmp_path / "wavy.step")
     result = repair(model, openings="close", tolerance=Tolerance.of(model))
-    assert result.verdict == Verdict.REFUSED
-    (problem,) = result.problems
-    assert problem.kind == "opening"
-    assert "not planar" in problem.message
-    assert "--scope all" in problem.message
-    assert problem.where[2] == pytest.approx(3.0, abs=0.1)
+    assert result.verdict == Verdict.INVENTED
+    after = result.to_assembly()
+    assert (after.topology.use_counts() == 2).all()
+    assert max(s.gap for s in measure_seams(after)) <= 1e-6 * model.diagonal
+    assert sum(isinstance(part.surface, Plane) for part in after.parts) == 1
+    # a quarter turn takes the wave cos 2u to its negative, so a fill that treats all sides alike adds no volume
+    assert after.triangulation.volume == pytest.approx(3.0 * enclosed(tube()), rel=1e-3)
