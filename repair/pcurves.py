@@ -24,6 +24,7 @@ from patchwright.models.surface import Surface
 from patchwright.ssi.closed_forms.inversion import TURN, Analytic, inverted
 
 DEGREE = 5
+SHORTEST = 1e-11  # of the parameters: ranges between knots as short as this are round-off
 FIRST, MOST = 12, 768  # points per piece at first, and on all pieces when no more are tried
 KNOT_PROBES = 8  # per span of a pcurve, where it may cross knot lines or leave its surface
 BEYOND = 1e-9  # of a domain: what a pcurve may leave it by
@@ -215,9 +216,17 @@ def _smooth_pieces(curve: NurbsCurve) -> list[tuple[float, float]]:
     """The ranges between the corners a knot of full multiplicity allows."""
     values, counts = distinct(curve.knots)
     t0, t1 = curve.domain
-    inner = values[(counts >= curve.degree) & (values > t0) & (values < t1)]
-    ends = [t0, *inner.tolist(), t1]
-    return list(pairwise(ends))
+    return _ranges(np.array([t0, *values[(counts >= curve.degree) & (values > t0) & (values < t1)], t1]))
+
+
+def _ranges(stops: Array) -> list[tuple[float, float]]:
+    """The ranges between increasing stops, without those too short for distinct sites; first and last stay."""
+    least = SHORTEST * max(float(np.ptp(stops)), float(np.abs(stops).max()))
+    kept = [float(stops[0])]
+    for stop in stops[1:-1].tolist():
+        if stop - kept[-1] > least and stops[-1] - stop > least:
+            kept.append(stop)
+    return list(pairwise([*kept, float(stops[-1])]))
 
 
 def _sites(a: float, b: float, count: int) -> Array:
@@ -257,7 +266,7 @@ def fitted(
     Where that is not near enough, pieces between all its knots and the parameters `corners` are tried.
     """
     smooth = _smooth_pieces(like)
-    every = list(pairwise(np.union1d(like.breaks, [] if corners is None else corners).tolist()))
+    every = _ranges(np.union1d(like.breaks, [] if corners is None else corners))
     made, off = _through(place, smooth, accuracy)
     if off > accuracy and len(smooth) < len(every) <= MOST // FIRST:
         other, closer = _through(place, every, accuracy)

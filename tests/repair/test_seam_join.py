@@ -18,7 +18,7 @@ from patchwright.repair.cad_draft import Draft, Limits
 from patchwright.repair.checks.bare_faces import completed
 from patchwright.repair.face_sides import one_sided
 from patchwright.repair.meeting import on_all, on_both
-from patchwright.repair.pcurves import below
+from patchwright.repair.pcurves import below, fitted
 from patchwright.repair.seam_join import COARSE, FINE, join_seams
 from patchwright.repair.seam_pieces import cut, seams
 from patchwright.repair.side_strip import strip_sides
@@ -205,6 +205,17 @@ def test_pcurves_from_poles_and_on_parallelograms():
     assert exact.pcurve.control_points == pytest.approx(
         np.array([[0.1, 0.2], [0.8, 0.1], [0.9, 0.7], [0.3, 0.9]]), abs=1e-14
     )
+
+
+@pytest.mark.parametrize("apart", [2e-16, 1e-13])
+def test_knots_apart_by_round_off_are_one_corner(apart):
+    # two corners at 0.5 and a last range as short as round-off
+    stops = np.array([0.0, 0.5, 0.5 + apart, 1.0 - apart, 1.0])
+    bent = NurbsCurve(1, np.array([0.0, *stops, 1.0]), np.array([[0, 0], [1, 0], [1, 0], [1, 1], [1, 1]], dtype=float))
+    found = fitted(bent, bent, 1e-9)
+    t = np.linspace(0.0, 1.0, 101)
+    assert np.abs(found(t) - bent(t)).max() <= 1e-9
+    assert found.domain == (0.0, 1.0)
 
 
 def test_faces_are_turned_to_one_side():
