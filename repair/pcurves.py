@@ -58,7 +58,7 @@ def below(surface: Surface, curve: NurbsCurve, accuracy: float, near: Array | No
     exact = _straight(surface, curve, near, accuracy) or _affine(surface, curve)
     if exact is not None:
         return exact
-    smooth, every = _smooth_pieces(curve), list(pairwise(curve.breaks.tolist()))
+    smooth, every = _smooth_pieces(curve), _ranges(curve.breaks)
     best = _refined(surface, curve, accuracy, near, smooth)
     if best.residual > accuracy and len(smooth) < len(every) <= MOST // FIRST:  # its knots may stand in the way
         other = _refined(surface, curve, accuracy, near, every)
