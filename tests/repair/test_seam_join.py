@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from itertools import pairwise
 
@@ -23,7 +24,7 @@ from patchwright.repair.seam_join import COARSE, FINE, join_seams
 from patchwright.repair.seam_pieces import cut, seams
 from patchwright.repair.side_strip import strip_sides
 
-LIMITS = Limits.of(2.0)
+LIMITS = Limits.of(2.0, math.inf)
 
 
 def bilinear(corners) -> NurbsSurface:
