@@ -44,7 +44,7 @@ def test_strips_are_ladders_of_right_angles(plates):
 def test_however_thin_nothing_is_folded_and_features_are_followed(plates):
     for layout in plates:
         assert layout.report.folded == 0
-        assert layout.report.median_scaled_jacobian > 0.7  # half of the quads have no corner 45 degrees off a right angle
+        assert layout.report.median_scaled_jacobian > 0.7  # most quads: no corner 45 degrees off a right angle
         assert layout.report.feature_coverage == pytest.approx(1.0, abs=1e-9)
 
 
