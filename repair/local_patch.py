@@ -23,7 +23,7 @@ from patchwright.models.errors import ParameterError
 from patchwright.models.nurbs_surface import NurbsSurface
 from patchwright.models.triangulation import Triangulation
 from patchwright.repair.approximant import TWISTS, bicubic_approximant
-from patchwright.repair.coons import coons_grid, offset_distance
+from patchwright.repair.coons import offset_distance
 from patchwright.repair.filling import METHODS, FillStatus, fill
 from patchwright.repair.misfit import Misfit, misfit
 from patchwright.repair.patch_ground import PatchGround
@@ -164,7 +164,7 @@ def approximate(
         probes = _chosen(sides, ground, sign, outermost)
     else:
         shares = np.linspace(0.0, 1.0, SIDE)
-        probes = Probes.of(_coons(sides, shares, shares), offset, sign)
+        probes = Probes.of(sides.coons(shares, shares), offset, sign)
     u, v = np.linspace(0.0, 1.0, FIRST + 1), np.linspace(0.0, 1.0, FIRST + 1)
     best: LocalPatch | None = None
     rounds, stale = 0, 0
@@ -225,17 +225,13 @@ def _ended(patch: LocalPatch, status: Status, rounds: int) -> LocalPatch:
     return replace(patch, status=status, rounds=rounds)
 
 
-def _coons(sides: Sides, u: Array, v: Array) -> Array:
-    return coons_grid(*sides.rows(u, v), u=u, v=v)
-
-
 def _chosen(sides: Sides, ground: Ground, sign: int, outermost: bool) -> Probes:
     """Probes of the smallest halving of HJR 7 that loses none of the points HJR 7 finds.
 
     Where the outermost sheet is wanted, one that reaches less far may have missed it: then too no smaller one is taken.
     """
     shares = np.linspace(0.0, 1.0, SIDE)
-    coons = _coons(sides, shares, shares)
+    coons = sides.coons(shares, shares)
     points = coons[1:-1, 1:-1].reshape(-1, 3)
 
     def found(probes: Probes) -> tuple[int, float]:
@@ -283,7 +279,7 @@ def _round(
 
 def _sampled(sides: Sides, u: Array, v: Array, ground: Ground, probes: Probes, filling: str, outermost: bool) -> _Grid:
     """The points of the geometry over the Coons grid, with artificial ones where there are none (HJR 4-13)."""
-    coons = _coons(sides, u, v)
+    coons = sides.coons(u, v)
     normal, offset = probes.at(u, v), probes.distance
     inner = np.zeros(coons.shape[:2], dtype=bool)
     inner[1:-1, 1:-1] = True

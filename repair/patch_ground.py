@@ -11,7 +11,7 @@ from patchwright.models.errors import ParameterError
 from patchwright.models.tolerance import Tolerance
 from patchwright.models.tree import Tree
 from patchwright.models.triangulation import Triangulation
-from patchwright.repair.coons import coons_grid, offset_distance, offset_normals
+from patchwright.repair.coons import offset_distance, offset_normals
 from patchwright.repair.facing import facing
 from patchwright.repair.patch_sides import Sides
 from patchwright.repair.projection import Ground
@@ -51,7 +51,7 @@ class PatchGround:
         offset : half the length of the probes that ask; default an eighth of the perimeter (HJR 7)
         """
         shares = np.linspace(0.0, 1.0, SAMPLES)
-        coons = coons_grid(*sides.rows(shares, shares), u=shares, v=shares)
+        coons = sides.coons(shares, shares)
         reach = float(offset_distance(coons)) if offset is None else offset
         points, normals = (x[1:-1, 1:-1].reshape(-1, 3) for x in (coons, offset_normals(coons)))
         body, sign = facing(self.body, points, normals, reach)

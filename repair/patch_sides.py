@@ -101,6 +101,10 @@ class Sides:
         """Points of south, north (M + 1, 3) at shares u and of west, east (N + 1, 3) at shares v of the arc length."""
         return self.south.at(u), self.north.at(u), self.west.at(v), self.east.at(v)
 
+    def coons(self, u: Array, v: Array) -> Array:
+        """(M + 1, N + 1, 3) points of the Coons patch at shares u and v of the arc length (HJR 4)."""
+        return coons_grid(*self.rows(u, v), u=u, v=v)
+
 
 def through(points: npt.ArrayLike, scheme: str | None = None, parameters: Wanted | None = None, **options: Any) -> Side:
     """The side through points (k, 3) by any interpolation scheme.
@@ -191,10 +195,10 @@ def laid(
     if not any(which):
         return sides
     shares = np.linspace(0.0, 1.0, LAID)
-    coons = coons_grid(*sides.rows(shares, shares), u=shares, v=shares)
+    coons = sides.coons(shares, shares)
     reach = float(offset_distance(coons)) if offset is None else offset
     few = np.linspace(0.0, 1.0, SIDE)
-    probes = Probes.of(coons_grid(*sides.rows(few, few), u=few, v=few), reach, ground[1])
+    probes = Probes.of(sides.coons(few, few), reach, ground[1])
     normal = probes.at(shares, shares)
     out = []
     four = (sides.south, sides.east, sides.north, sides.west)
