@@ -27,6 +27,8 @@ import tempfile
 import time
 from pathlib import Path
 
+from rows import line
+
 HERE = Path(__file__).resolve().parent
 DATA = Path(os.environ.get("PATCHWRIGHT_DATA", HERE.parent.parent / "shared" / "data"))
 FILES = ("turbine_part.stp", "k1_loose_shells.stp", "t4mec.stp", "b1_invalid_faces.stp")
@@ -204,14 +206,6 @@ def judged(name: str, limit: float, with_gmsh: bool) -> dict[str, object]:
     return {"verdict": "CRASHED", "why": (done.stderr.strip().splitlines() or ["no message"])[-1]}
 
 
-def line(row: dict[str, object]) -> str:
-    cells = []
-    for name, form in COLUMNS:
-        width = form.split(":")[1].strip(">}").split(".")[0].rstrip("dsfe%")
-        cells.append(form.format(row[name]) if row.get(name) is not None else "-".rjust(int(width)))
-    return " ".join(cells) + (f"  {row['why']}" if row.get("why") else "")
-
-
 def main() -> None:
     arguments = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     arguments.add_argument("--only", default="", help="cases whose name holds this word")
@@ -229,7 +223,7 @@ def main() -> None:
     for name in cases():
         if asked.only in name:
             rows.append({"case": name, **judged(name, asked.limit, not asked.no_gmsh)})
-            print(line(rows[-1]), flush=True)
+            print(line(rows[-1], COLUMNS), flush=True)
     if asked.json:
         asked.json.write_text(json.dumps(rows, indent=1))
 

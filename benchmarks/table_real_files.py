@@ -24,6 +24,8 @@ import tempfile
 import time
 from pathlib import Path
 
+from rows import line
+
 HERE = Path(__file__).resolve().parent
 DATA = Path(os.environ.get("PATCHWRIGHT_DATA", HERE.parent.parent / "shared" / "data"))
 MESH = (".stl", ".obj", ".ply", ".off", ".tri")
@@ -117,14 +119,6 @@ def judged(path: Path, limit: float) -> dict[str, object]:
     return {"verdict": "unreadable" if raised else "CRASHED", "why": f"exit code {done.returncode}: {last[0]}"}
 
 
-def line(row: dict[str, object]) -> str:
-    cells = []
-    for name, form in COLUMNS:
-        width = form.split(":")[1].strip(">}").split(".")[0].rstrip("dsfe%")
-        cells.append(form.format(row[name]) if row.get(name) is not None else "-".rjust(int(width)))
-    return " ".join(cells) + (f"  {row['why']}" if row.get("why") else "")
-
-
 def main() -> None:
     arguments = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     arguments.add_argument("paths", nargs="*", type=Path)
@@ -143,7 +137,7 @@ def main() -> None:
     rows = []
     for path in files:
         rows.append({"file": path.name[:24], **judged(path, asked.limit)})
-        print(line(rows[-1]), flush=True)
+        print(line(rows[-1], COLUMNS), flush=True)
     usable = sum(bool(row.get("usable")) for row in rows)
     false = sum(row.get("false") == "yes" for row in rows)
     print(f"\n{usable} of {len(rows)} usable ({usable / max(1, len(rows)):.0%}), {false} false repairs")
