@@ -93,7 +93,7 @@ def verdict(place: str, rows: list[dict[str, object]]) -> str:
     best = sum(row["best"] == "smooth" for row in rows)
     ratio = paper / default
     return (
-        f"{place}: no worse than the paper's method in {len(rows) - worse} of {len(rows)} cases, best of all in {best}; "
+        f"{place}: no worse than the paper in {len(rows) - worse} of {len(rows)} cases, best of all in {best}, "
         f"the paper's error is {np.median(ratio):.1f} times the default's, at least {ratio.min():.2f}"
     )
 

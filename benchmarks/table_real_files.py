@@ -17,19 +17,15 @@ import argparse
 import json
 import os
 import resource
-import signal
-import subprocess
-import sys
 import tempfile
 import time
 from pathlib import Path
 
-from rows import line
+from rows import heading, limit_processor, line, print_row, row_of_child
 
 HERE = Path(__file__).resolve().parent
 DATA = Path(os.environ.get("PATCHWRIGHT_DATA", HERE.parent.parent / "shared" / "data"))
 MESH = (".stl", ".obj", ".ply", ".off", ".tri")
-WALL = 10.0  # times the limit: a process that takes so long on the clock hangs
 CAD = (".stp", ".step", ".igs", ".iges")
 COLUMNS = (
     ("file", "{:24s}"), ("verdict", "{:16s}"), ("in", "{:>7d}"), ("kept", "{:>7d}"), ("new", "{:>6d}"),
@@ -104,19 +100,8 @@ def judge(path: Path) -> dict[str, object]:
 
 def judged(path: Path, limit: float) -> dict[str, object]:
     """`judge` in a process of its own; a row in any case."""
-    command = [sys.executable, __file__, "--row", str(path), "--limit", str(limit)]
-    try:
-        done = subprocess.run(command, capture_output=True, text=True, timeout=WALL * limit)
-    except subprocess.TimeoutExpired:
-        return {"verdict": "HANGS", "why": f"not done after {WALL * limit:g} s"}
-    if done.returncode == -signal.SIGXCPU:
-        return {"verdict": "OVER TIME", "why": f"not done after {limit:g} s of processor time"}
-    lines = [line for line in done.stdout.splitlines() if line.startswith("ROW ")]
-    if lines:
-        return dict(json.loads(lines[-1][4:]))
-    last = done.stderr.strip().splitlines()[-1:] or ["no message"]
-    raised = "Error: " in last[0] and "patchwright.models.errors" in last[0]
-    return {"verdict": "unreadable" if raised else "CRASHED", "why": f"exit code {done.returncode}: {last[0]}"}
+    row = row_of_child(__file__, ["--row", str(path)], limit)
+    return {"verdict": row.pop("how").upper(), **row} if "how" in row else row
 
 
 def main() -> None:
@@ -128,12 +113,12 @@ def main() -> None:
     arguments.add_argument("--row", type=Path, help=argparse.SUPPRESS)
     asked = arguments.parse_args()
     if asked.row:
-        resource.setrlimit(resource.RLIMIT_CPU, (int(asked.limit), int(asked.limit) + 5))
-        print("ROW " + json.dumps(judge(asked.row)))
+        limit_processor(asked.limit)
+        print_row(judge(asked.row))
         return
     files = [f for p in asked.paths or [DATA] for f in (sorted(p.iterdir()) if p.is_dir() else [p])]
     files = [f for f in files if kind(f) and asked.only in (None, kind(f))]
-    print(" ".join(f"{name:>{len(form.format(0 if 's}' not in form else ''))}}" for name, form in COLUMNS))
+    print(heading(COLUMNS))
     rows = []
     for path in files:
         rows.append({"file": path.name[:24], **judged(path, asked.limit)})
