@@ -1,6 +1,8 @@
 """Put a displaced piece back: one rigid motion that lays its border onto the border of the hole it left.
 
-A face (or a sewn group of faces) that was shifted or turned as a whole still has the shape of its hole. The motion is
+A face (or a sewn group of faces) that was shifted or turned as a whole still has the shape of its hole; one that no
+motion fits may have shrunk or grown, and then a similarity is looked for: a plane stays the plane it is, and only its
+trims move. The motion is
 found from the rims alone: differences of corners propose shifts, Gauss-Newton on the distances along the normals of
 the target curves finishes (Chen and Medioni, Object modelling by registration of multiple range images, 1992, for
 curves), every distance weighed down by its own size, so that stretches without a counterpart, where the neighbour was
@@ -14,13 +16,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from patchwright.models.analytic import Plane
 from patchwright.models.arrays import Array, IntArray
 from patchwright.models.cad.connectivity import components
+from patchwright.models.cad.editing import Loops, with_loops
 from patchwright.models.closest_point import closest_on_curve
 from patchwright.models.nurbs_curve import NurbsCurve
 from patchwright.models.rigid_motion import RigidMotion
+from patchwright.models.similarity import Similarity
 from patchwright.models.surface import Surface
+from patchwright.models.topology import EdgeUse, Topology
 from patchwright.repair.cad_draft import RIM_SHARE, Change, Draft, Limits, apart
+from patchwright.repair.pcurves import widened
 from patchwright.repair.result import Rung
 
 SAMPLES = 33  # per edge
@@ -30,6 +37,8 @@ STEPS = 16
 PATIENCE = 3  # steps in a row without getting nearer before a proposal is given up
 MOST = 0.6  # of a border that must fit to round-off
 COARSE = 4.0  # rows farther off than the median times this hardly pull
+RESIZED = 0.1  # the largest change of size that is looked for
+IN_PLANE = 1e-12  # of a border's size and distance from the origin: it stays in its plane
 NEGLIGIBLE = 1e-9  # singular values below this share of the largest are motions that the rims leave free
 
 
@@ -60,7 +69,7 @@ class _Rims:
 class _Fit:
     """A motion, and the share of a border that lies on others' to the residual after it."""
 
-    motion: RigidMotion
+    motion: Similarity
     residual: float
     share: float
 
@@ -74,6 +83,7 @@ def realign(draft: Draft, limits: Limits) -> tuple[Draft, tuple[Change, ...]]:
     largest = int(np.argmax(areas))
     changes: list[Change] = []
     loose = [k for k in range(len(groups)) if k != largest]
+    sized = False
     while not limits.expired:  # a piece put back completes the holes of its neighbours
         best: tuple[float, int, list[int], _Fit] | None = None
         for number in loose:
@@ -82,12 +92,16 @@ def realign(draft: Draft, limits: Limits) -> tuple[Draft, tuple[Change, ...]]:
             if not own or not others or limits.expired:
                 continue
             rims = _Rims.of(draft, own)
-            fit = _motion(rims, _Rims.of(draft, others), limits)
+            fit = _motion(rims, _Rims.of(draft, others), limits, sized)
             # of two pieces that fit each other the one moves that has the longer border in place then
             if fit is not None and (best is None or fit.share * rims.length > best[0]):
                 best = fit.share * rims.length, number, own, fit
         if best is None:
-            break
+            if sized:
+                break
+            sized = True
+            continue
+        sized = False
         change, draft = _put_back(draft, groups[best[1]], best[2], best[3], limits)
         changes.append(change)
         loose.remove(best[1])
@@ -95,12 +109,15 @@ def realign(draft: Draft, limits: Limits) -> tuple[Draft, tuple[Change, ...]]:
 
 
 def _put_back(draft: Draft, faces: list[int], own: list[int], fit: _Fit, limits: Limits) -> tuple[Change, Draft]:
+    scale = fit.motion.scale
     draft, move = _applied(draft, faces, fit.motion)
+    what = "displaced" if scale == 1.0 else "shrunk" if scale > 1.0 else "grown"
+    how = "rigid motion" if scale == 1.0 else f"motion with a change of size by {scale:.6g}"
     change = Change(
-        "displaced face put back" if len(faces) == 1 else "displaced faces put back",
+        f"{what} face{'s' * (len(faces) > 1)} put back",
         Rung.REALIGN,
         tuple(faces),
-        f"{fit.share:.0%} of its border lies on its neighbours' to {fit.residual:.2g} after one rigid motion",
+        f"{fit.share:.0%} of its border lies on its neighbours' to {fit.residual:.2g} after one {how}",
         limits.on,
         move,
         _Rims.of(draft, own).points.mean(axis=0),
@@ -115,8 +132,11 @@ def _size(draft: Draft, face: int) -> float:
     return float(np.linalg.norm(np.ptp(points, axis=0)))
 
 
-def _motion(own: _Rims, others: _Rims, limits: Limits) -> _Fit | None:
-    """The motion that lays most of `own` onto `others`; None where there is none or none is needed."""
+def _motion(own: _Rims, others: _Rims, limits: Limits, sized: bool) -> _Fit | None:
+    """The motion that lays most of `own` onto `others`; None where there is none or none is needed.
+
+    `sized` allows a change of size too.
+    """
     size = float(np.linalg.norm(np.ptp(own.points, axis=0)))
     reach = min(limits.reach, RIM_SHARE * size)
     centre = own.points.mean(axis=0)
@@ -135,7 +155,8 @@ def _motion(own: _Rims, others: _Rims, limits: Limits) -> _Fit | None:
         if any(np.linalg.norm(shifts[k] - other) <= 1e-3 * reach for other in done):
             continue
         done.append(shifts[k])
-        motion = _fitted(own, others, RigidMotion.of(np.zeros(3), centre, shifts[k]), limits)
+        start = Similarity(RigidMotion.of(np.zeros(3), centre, shifts[k]))
+        motion = _fitted(own, others, start, limits, sized)
         if motion is None:
             continue
         moved = motion(own.points)
@@ -146,23 +167,24 @@ def _motion(own: _Rims, others: _Rims, limits: Limits) -> _Fit | None:
     return None
 
 
-def _fitted(own: _Rims, others: _Rims, motion: RigidMotion, limits: Limits) -> RigidMotion | None:
+def _fitted(own: _Rims, others: _Rims, like: Similarity, limits: Limits, sized: bool) -> Similarity | None:
     """Gauss-Newton from a first motion; None where it leaves the neighbourhood."""
     best, tired = np.inf, 0
+    motion, scale = like.motion, like.scale
     for _ in range(STEPS):
-        at = motion(own.points[::THIN])
+        at = Similarity(motion, scale)(own.points[::THIN])
         feet, far = _nearest(others, at)
         middle = float(np.median(far))
         best, tired = (middle, 0) if middle < 0.7 * best else (best, tired + 1)
         if tired > PATIENCE and best > limits.on:
             return None
         away = feet - at
-        scale = max(COARSE * middle, 1e-4 * limits.on)
-        weight = 1.0 / (1.0 + (far / scale) ** 2)
+        width = max(COARSE * middle, 1e-4 * limits.on)
+        weight = 1.0 / (1.0 + (far / width) ** 2)
         if middle > limits.reach:
             return None
         arm = at - (motion.centre + motion.shift)
-        # rows of d(at) = turn x arm + shift
+        # rows of d(at) = turn x arm + shift (+ growth * arm)
         zero = np.zeros(len(at))
         cross = np.stack(
             [
@@ -174,14 +196,20 @@ def _fitted(own: _Rims, others: _Rims, motion: RigidMotion, limits: Limits) -> R
         )
         longest = float(np.abs(arm).max())
         rows = np.concatenate([cross / longest, np.broadcast_to(np.eye(3), cross.shape)], axis=2)
+        if sized:
+            rows = np.concatenate([rows, arm[:, :, None] / longest], axis=2)
         across = np.eye(3) - _tangents(others, feet)
         rows, right = across @ rows * weight[:, None, None], (across @ away[..., None])[..., 0] * weight[:, None]
-        found = np.linalg.lstsq(rows.reshape(-1, 6), right.ravel(), rcond=NEGLIGIBLE)[0]
+        found = np.linalg.lstsq(rows.reshape(-1, rows.shape[2]), right.ravel(), rcond=NEGLIGIBLE)[0]
         turn = RigidMotion.of(found[:3] / longest, np.zeros(3), np.zeros(3)).rotation
-        motion = RigidMotion(turn @ motion.rotation, motion.centre, motion.shift + found[3:])
+        motion = RigidMotion(turn @ motion.rotation, motion.centre, motion.shift + found[3:6])
+        if sized:
+            scale *= 1.0 + float(found[6]) / longest
+            if abs(scale - like.scale) > RESIZED:
+                return None
         if np.abs(found).max() <= 1e-5 * limits.on:
             break
-    return motion
+    return Similarity(motion, scale)
 
 
 def _nearest(rims: _Rims, points: Array) -> tuple[Array, Array]:
@@ -213,7 +241,8 @@ def _tangents(rims: _Rims, feet: Array) -> Array:
     return np.asarray(along[:, :, None] * along[:, None, :])
 
 
-def _applied(draft: Draft, faces: list[int], motion: RigidMotion) -> tuple[Draft, float]:
+def _applied(draft: Draft, faces: list[int], motion: Similarity) -> tuple[Draft, float]:
+    """The faces moved, and by how much at most; a plane that is moved into itself stays, and its trims move."""
     topology = draft.topology
     edges = sorted({use.edge for face in faces for loop in topology.loops[face] for use in loop})
     curves, vertices = list(topology.curves), topology.vertices.copy()
@@ -221,9 +250,50 @@ def _applied(draft: Draft, faces: list[int], motion: RigidMotion) -> tuple[Draft
         curves[edge] = motion.curve(curves[edge])
     corners = np.unique(topology.ends[edges])
     vertices[corners] = motion(topology.vertices[corners])
-    surfaces: dict[int, Surface] = {face: motion.surface(draft.surface(face)) for face in faces}
+    surfaces: dict[int, Surface] = {}
+    same: dict[int, Surface] = {}
+    loops: dict[int, Loops] = {}
+    for face in faces:
+        old = draft.surface(face)
+        if isinstance(old, Plane) and motion.scale != 1.0 and _into_itself(old, topology, face, motion):
+            loops[face] = _redrawn(old, topology.loops[face], curves)
+            points = np.concatenate([use.pcurve.control_points for loop in loops[face] for use in loop])
+            same[face] = widened(old, points)
+            continue
+        surfaces[face] = motion.surface(old)
+        if motion.scale != 1.0:
+            loops[face] = _resized(topology.loops[face], motion.factors(old))
     move = float(np.linalg.norm(vertices[corners] - topology.vertices[corners], axis=1).max(initial=0.0))
     points = np.concatenate([topology.curves[e].control_points for e in edges])
     move = max(move, float(np.linalg.norm(motion(points) - points, axis=1).max()))
-    moved = replace(topology, curves=tuple(curves), vertices=vertices)
-    return draft.with_surfaces(surfaces, moved, same=False), move
+    moved = replace(with_loops(topology, loops), curves=tuple(curves), vertices=vertices)
+    draft = draft.with_surfaces(surfaces, moved, same=False)
+    return draft.with_surfaces(same, moved, same=True), move
+
+
+def _into_itself(plane: Plane, topology: Topology, face: int, motion: Similarity) -> bool:
+    """Whether the border stays in the plane to round-off."""
+    points = np.concatenate([topology.curves[u.edge].control_points for loop in topology.loops[face] for u in loop])
+    off = np.abs((motion(points) - plane.origin) @ plane.normal).max()
+    return bool(off <= IN_PLANE * max(float(np.ptp(points, axis=0).max()), float(np.abs(points).max())))
+
+
+def _redrawn(plane: Plane, loops: Loops, curves: list[NurbsCurve]) -> Loops:
+    """Loops whose pcurves are the images of the edges' curves in the plane."""
+    axes = np.stack([plane.xdir, plane.ydir], axis=1)
+
+    def below(use: EdgeUse) -> EdgeUse:
+        curve = curves[use.edge]
+        flat = (curve.control_points - plane.origin) @ axes
+        return replace(use, pcurve=NurbsCurve(curve.degree, curve.knots, flat, curve.weights))
+
+    return tuple(tuple(below(use) for use in loop) for loop in loops)
+
+
+def _resized(loops: Loops, factors: Array) -> Loops:
+    """Loops with the parameters of their pcurves multiplied."""
+
+    def times(pcurve: NurbsCurve) -> NurbsCurve:
+        return NurbsCurve(pcurve.degree, pcurve.knots, pcurve.control_points * factors, pcurve.weights)
+
+    return tuple(tuple(replace(use, pcurve=times(use.pcurve)) for use in loop) for loop in loops)

@@ -28,7 +28,7 @@ from patchwright.repair.seam_nodes import Nodes, placed
 from patchwright.repair.seam_pieces import Cut, Piece, cut, seams
 
 FINE = (1e-6, 1e-5, 1e-4)  # of the diagonal: reaches at which a file's own precision may have left its edges
-COARSE = (3e-4, 1e-3)  # of the diagonal: reaches beyond it, tried after displaced faces have been put back
+COARSE = (3e-4, 1e-3, 3e-3, 1e-2)  # of the diagonal: reaches beyond it, tried after displaced faces have been put back
 TIGHT = 10.0  # of the rungs' finest length: how near a new pcurve follows its edge
 ROUNDS = 8  # times a reach is tried again with the seams left out that do not hold
 
