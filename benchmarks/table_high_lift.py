@@ -65,7 +65,7 @@ def ours(seed: int) -> str:
         f"{in_slot(oracle.mirrored(craft), parts)}  surface {off / size:7.1e}  line {far / size:7.1e}  "
         f"plane {max(border):7.1e}  located {oracle.located(dirty):6.1%}  "
         f"false {oracle.false_changes(dirty, result.ledger):2d}  "
-        f"patches {len(result.faces):5d}  {spent:6.1f} s  {result.verdict.value}"
+        f"faces {len(result.faces):5d}  {spent:6.1f} s  {result.verdict.value}"
     )
 
 

@@ -237,7 +237,8 @@ def _row_json(r: CaseResult) -> dict[str, Any]:
 
 def _body_json(b: BodyResult) -> dict[str, Any]:
     return {
-        "figure": b.figure, "title": b.title, "verdict": b.repaired.verdict.value, "patches": len(b.repaired.faces),
+        "figure": b.figure, "title": b.title, "verdict": b.repaired.verdict.value,
+        "patches": len(b.repaired.network or ()),
         "median distance to the truth": b.to_truth[0], "99 % distance to the truth": b.to_truth[1],
         "invented share of the area": b.repaired.invented, "cpu seconds": b.seconds,
     }  # fmt: skip
@@ -261,7 +262,8 @@ def _table(rows: Sequence[CaseResult], bodies: Sequence[BodyResult]) -> list[str
             lines.append(f"      {r.patch.status.value}")
     for b in bodies:
         lines.append(
-            f"{b.figure:>3} {b.title:<38}{len(b.repaired.faces):>6} patches, median {b.to_truth[0]:.1e} and 99 % "
-            f"{b.to_truth[1]:.1e} from the truth, {b.repaired.invented:.1%} invented, {b.seconds:.0f} s"
+            f"{b.figure:>3} {b.title:<38}{len(b.repaired.network or ()):>6} patches, "
+            f"median {b.to_truth[0]:.1e} and 99 % {b.to_truth[1]:.1e} from the truth, "
+            f"{b.repaired.invented:.1%} invented, {b.seconds:.0f} s"
         )
     return lines

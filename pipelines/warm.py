@@ -79,6 +79,8 @@ def main() -> None:
     from patchwright.models.tolerance import Tolerance
     from patchwright.models.tree import Tree
     from patchwright.models.triangulation import Triangulation
+    from patchwright.repair.block_faces import block_faces
+    from patchwright.repair.blocks import single_blocks
     from patchwright.repair.patch_fit import Target
     from patchwright.repair.quad_layout import quad_layout
     from patchwright.repair.resurface import resurface
@@ -88,8 +90,9 @@ def main() -> None:
     target = Target(Tree.of(body), np.zeros(len(body), dtype=bool))
     network = resurface(layout, target, Tolerance.of(body, fit=body.diagonal))
     nothing = Triangulation(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64))
-    parts = tuple(Part("", nothing, surface=surface) for surface in network.surfaces())
-    edge_deviation(Assembly(parts, topology=network.topology()))
+    faces = block_faces(network, single_blocks(layout))
+    parts = tuple(Part("", nothing, surface=surface) for surface in faces.surfaces)
+    edge_deviation(Assembly(parts, topology=faces.topology))
 
 
 def _noisy_torus(rows: int = 24, columns: int = 48) -> Triangulation:

@@ -85,6 +85,14 @@ def find_blocks(layout: QuadLayout, *, full_faces: bool = False) -> Blocks:
     return blocks
 
 
+def single_blocks(layout: QuadLayout) -> Blocks:
+    """Every quad a block of its own."""
+    m = len(layout.quads)
+    zero = np.zeros(m, dtype=np.int64)
+    wall = np.ones(len(layout.edges), dtype=bool)
+    return Blocks(wall, np.arange(m), np.zeros((m, 2), dtype=np.int64), zero, np.ones((m, 2), dtype=np.int64))
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class _Mesh:
     """A layout's half-edges, see `_block_kernel`; `tail` and `head` (4 m,) are the vertices each one joins."""

@@ -76,6 +76,7 @@ def repair(
         from patchwright.repair.aside import with_aside
         from patchwright.repair.given_layout import layout_of
         from patchwright.repair.mesh_route import repair_mesh
+        from patchwright.repair.quad_layout import QuadLayout
 
         given = layout if isinstance(layout, str) else layout_of(layout, task.limits)
         result = repair_mesh(
@@ -83,6 +84,7 @@ def repair(
             task.limits,
             scope=scope,
             layout=given,
+            merged=isinstance(layout, str | QuadLayout),
             openings=openings,
             clean=task.diagnosis.clean and not task.entries,
             decisions=task.decisions,

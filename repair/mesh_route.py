@@ -19,8 +19,9 @@ from patchwright.models.errors import GeometryError
 from patchwright.models.tolerance import Tolerance
 from patchwright.models.tree import Tree
 from patchwright.models.triangulation import Triangulation
+from patchwright.repair.block_faces import BlockFaces, block_faces
 from patchwright.repair.block_grid import block_grid
-from patchwright.repair.blocks import Blocks, find_blocks, smallest_corner
+from patchwright.repair.blocks import Blocks, find_blocks, single_blocks, smallest_corner
 from patchwright.repair.cad_ground import ground_of, measured, on_model, true_entry
 from patchwright.repair.decisions import Decisions
 from patchwright.repair.deviation import Deviation
@@ -54,6 +55,7 @@ def repair_mesh(
     *,
     scope: str,
     layout: str | QuadLayout,
+    merged: bool = True,
     openings: Literal["keep", "close"],
     clean: bool,
     decisions: Decisions | None = None,
@@ -63,6 +65,7 @@ def repair_mesh(
 
     Parameters
     ----------
+    merged : whether the patches of a block become one face, or each patch its own
     clean : whether diagnosis found nothing wrong
     decisions : what stays as it is, and the symmetry planes whose borders stay on them
     scope : "least" keeps the input's triangles in the output triangulation, "all" takes the patches' tessellation
@@ -92,8 +95,9 @@ def repair_mesh(
     if deviation.coverage < COVERAGE_LEAST:
         return _refused(assembly, mended, ledger, (_uncovered(deviation),))
     blocks = find_blocks(network.layout)
-    seams = measure(network)
-    faces = _faces(network, mended)
+    made = block_faces(network, blocks if merged else single_blocks(network.layout))
+    seams = tuple(replace(s, faces=tuple(made.face[list(s.faces)].tolist())) for s in measure(network))
+    faces = _faces(network, mended, made)
     invented = float(mended.triangulation.areas[mended.origin == BRIDGED].sum() / mended.triangulation.areas.sum())
     ledger += (_fitting_entry(network, mended, tolerance, tries, resolution),)
     if isinstance(ground, TrueGround):
@@ -113,7 +117,7 @@ def repair_mesh(
             surface=surface,
             body="repaired",
         )
-        for face, surface in zip(faces, network.surfaces(), strict=True)
+        for face, surface in zip(faces, made.surfaces, strict=True)
     )
     return Repaired(
         verdict,
@@ -124,10 +128,10 @@ def repair_mesh(
         deviation,
         invented,
         (),
-        Assembly(parts, unit=assembly.unit, source=assembly.source, topology=network.topology()),
+        Assembly(parts, unit=assembly.unit, source=assembly.source, topology=made.topology),
         grid=block_grid(network, blocks, GRID),
         network=network,
-        figures=_figures(network, blocks, mended, seams, deviation),
+        figures=_figures(network, len(faces), blocks, mended, seams, deviation),
     )
 
 
@@ -176,14 +180,18 @@ def _point(where: Array) -> Point:
     return x, y, z
 
 
-def _faces(network: PatchNetwork, mended: Mended) -> tuple[Face, ...]:
-    """One face per patch; its origin are the tags of the triangles it was laid over."""
+def _faces(network: PatchNetwork, mended: Mended, made: BlockFaces) -> tuple[Face, ...]:
+    """One face per block of patches; its origin are the tags of the triangles it was laid over."""
     names = mended.triangulation.tag_names or ("",)
     cells = network.points(8)
     a, b = cells[:, 1:, 1:] - cells[:, :-1, :-1], cells[:, 1:, :-1] - cells[:, :-1, 1:]
     area = 0.5 * np.linalg.norm(np.cross(a, b), axis=-1)
-    total = area.sum(axis=(1, 2))
-    share = (area * network.invented).sum(axis=(1, 2)) / np.where(total > 0, total, 1.0)
+    total, invented = (np.bincount(made.face, x.sum(axis=(1, 2))) for x in (area, area * network.invented))
+    share = invented / np.where(total > 0, total, 1.0)
+    deviation = np.full(len(made), np.nan)
+    np.fmax.at(deviation, made.face, network.deviation)
+    tags = np.zeros(len(made), dtype=np.int64)
+    tags[made.face] = network.layout.tags
     return tuple(
         Face(
             f"{names[tag] or 'patch'}-{i + 1}",
@@ -193,9 +201,7 @@ def _faces(network: PatchNetwork, mended: Mended) -> tuple[Face, ...]:
             float(s),
             float(t),
         )
-        for i, (tag, s, d, t) in enumerate(
-            zip(network.layout.tags.tolist(), share, network.deviation, total, strict=True)
-        )
+        for i, (tag, s, d, t) in enumerate(zip(tags.tolist(), share, deviation, total, strict=True))
     )
 
 
@@ -296,7 +302,7 @@ def _fitting_entry(
 
 
 def _figures(
-    network: PatchNetwork, blocks: Blocks, mended: Mended, seams: Sequence[Seam], deviation: Deviation
+    network: PatchNetwork, faces: int, blocks: Blocks, mended: Mended, seams: Sequence[Seam], deviation: Deviation
 ) -> dict[str, float | int | str | bool]:
     """The numbers of the report's first table."""
     smooth = np.array([s.angle for s in seams if s.kind == "smooth"] or [0.0])
@@ -304,6 +310,7 @@ def _figures(
     jumps = (curvature_jumps(network.layout, network.nets) * mended.triangulation.diagonal)[inner]
     jumps = jumps if len(jumps) else np.zeros(1)
     return {
+        "faces": faces,
         "patches": len(network),
         "control points": len(network.nets.controls),
         "irregular vertices": network.layout.irregular_vertices,

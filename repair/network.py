@@ -10,7 +10,6 @@ import numpy as np
 from patchwright.models.arrays import Array, BoolArray, IntArray
 from patchwright.models.nurbs_curve import NurbsCurve
 from patchwright.models.nurbs_surface import NurbsSurface
-from patchwright.models.topology import EdgeUse, Topology
 from patchwright.models.triangulation import Triangulation
 from patchwright.repair.edge_curves import EdgeCurves
 from patchwright.repair.patch_nets import PatchNets
@@ -19,10 +18,6 @@ from patchwright.repair.spline_space import DEGREE, knots
 
 FEWEST_INTERVALS = 12
 MOST_TRIANGLES = 2_000_000
-
-_UNIT = np.array([0.0, 0.0, 1.0, 1.0])
-# the sides of the unit square in the order of a quad's edges, each from its start to its end corner
-_CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -55,28 +50,10 @@ class PatchNetwork:
                 out[patch] = NurbsSurface((DEGREE, DEGREE), (knots(m), knots(n)), net)
         return tuple(s for s in out if s is not None)
 
-    def topology(self) -> Topology:
-        """Vertices, edges and loops of the network, ready to be written as a shell."""
-        layout = self.layout
-        curves = []
-        for edge in range(len(layout.edges)):
-            rows = slice(self.edges.offsets[edge], self.edges.offsets[edge + 1])
-            curves.append(NurbsCurve(DEGREE, knots(int(self.edges.cells[edge])), self.edges.controls[rows]))
-        lines = {}
-        for k in range(4):
-            ends = _CORNERS[[k, (k + 1) % 4]]
-            for backward in (False, True):
-                lines[k, backward] = NurbsCurve(1, _UNIT, ends[::-1] if backward else ends)
-        loops = tuple(
-            (
-                tuple(
-                    EdgeUse(int(e), bool(r), lines[k, bool(r)])
-                    for k, (e, r) in enumerate(zip(quad, turned, strict=True))
-                ),
-            )
-            for quad, turned in zip(layout.quad_edges, layout.edge_reversed, strict=True)
-        )
-        return Topology(layout.vertices, tuple(curves), layout.edges, loops)
+    def curve(self, edge: int) -> NurbsCurve:
+        """The curve two patches share, from the first to the second vertex of an edge of the layout."""
+        rows = slice(self.edges.offsets[edge], self.edges.offsets[edge + 1])
+        return NurbsCurve(DEGREE, knots(int(self.edges.cells[edge])), self.edges.controls[rows])
 
     def invented_nodes(self, intervals: int) -> BoolArray:
         """(m, intervals + 1, intervals + 1) which of `points` lie on surface that gap filling made."""

@@ -45,7 +45,7 @@ class Rung(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Face:
-    """One output face: a kept CAD face or a fitted patch.
+    """One output face: a kept CAD face or a block of fitted patches.
 
     `origin` names the input parts it stands for, `deviation` is its largest distance from them (nan where everything
     is invented), `invented` the share of its area that gap filling made, `area` in square model units.
@@ -61,7 +61,7 @@ class Face:
 
 @dataclass(frozen=True, slots=True)
 class Seam:
-    """One edge of the output, measured surface to surface.
+    """One edge of the output, measured surface to surface; where two patches meet inside a face, twice that face.
 
     `kind` is "smooth", "sharp" or "free"; `angle` in degrees, the largest between both normals along the edge.
     """
@@ -116,7 +116,7 @@ class Repaired:
     problems : why it was refused, empty otherwise
     assembly : faces with topology, empty for a refusal
     grid : structured surface grid, None where no face is four-sided
-    network : the fitted patches, None when CAD faces were kept
+    network : the fitted patches, one or more per face, None when CAD faces were kept
     regions : the deviation part by part, invented surface included; empty for a refusal
     """
 

@@ -52,6 +52,8 @@ def refinement(coarse: int, fine: int) -> Array:
     """(fine + 3, coarse + 3) knot insertion as one matrix: the same curve in the finer space."""
     if fine % coarse:
         raise ValueError(f"{fine} cells do not refine {coarse}")
+    if fine == coarse:
+        return np.eye(coarse + DEGREE)
     sites = greville(fine)
     matrix = np.asarray(np.linalg.solve(collocation(fine, sites), collocation(coarse, sites)), dtype=np.float64)
     matrix[np.abs(matrix) < 1e-15] = 0.0

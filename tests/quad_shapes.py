@@ -6,6 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from patchwright.repair.blocks import Blocks
 from patchwright.repair.quad_layout import QuadLayout
 
 
@@ -108,3 +109,41 @@ def layout_from_quads(vertices, quads, path, sharp=()) -> QuadLayout:
         triangle=np.full(len(vertices), -1),
         tags=np.zeros(len(quads), dtype=np.int64),
     )
+
+
+def sheet(columns: int, rows: int, holes: tuple[tuple[int, int], ...] = (), bend: bool = False) -> QuadLayout:
+    """A flat sheet of unit quads, rolled into a tube in x when `bend`, without the quads in `holes`."""
+    width = columns if bend else columns + 1
+    i, j = np.meshgrid(np.arange(width), np.arange(rows + 1), indexing="ij")
+    angle = 2 * np.pi * i / columns
+    points = np.stack([np.cos(angle), j, np.sin(angle)], -1) if bend else np.stack([i, j, 0 * i], -1)
+    quads = [
+        [a % width * (rows + 1) + b for a, b in ((i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1))]
+        for i in range(columns)
+        for j in range(rows)
+        if (i, j) not in holes
+    ]
+    vertices = points.reshape(-1, 3).astype(np.float64)
+    return layout_from_quads(vertices, np.array(quads), lambda a, b: vertices[[a, b]])
+
+
+def torus_layout(columns: int, rows: int) -> QuadLayout:
+    """Quads round a torus, a regular grid that closes both ways; straight paths."""
+    i, j = np.meshgrid(np.arange(columns), np.arange(rows), indexing="ij")
+    after, above = (i + 1) % columns, (j + 1) % rows
+    number = np.stack([i * rows + j, after * rows + j, after * rows + above, i * rows + above], -1)
+    u, v = i * 2 * np.pi / columns, j * 2 * np.pi / rows
+    points = np.stack([(3 + np.cos(v)) * np.cos(u), (3 + np.cos(v)) * np.sin(u), np.sin(v)], -1).reshape(-1, 3)
+    return layout_from_quads(points, number.reshape(-1, 4), lambda a, b: points[[a, b]])
+
+
+def assert_rectangles(layout: QuadLayout, blocks: Blocks) -> None:
+    """Every block holds each of its places once, and its quads meet where their places do."""
+    key = np.column_stack([blocks.block, blocks.place])
+    assert len(np.unique(key, axis=0)) == len(layout) == blocks.shape.prod(axis=1).sum()
+    assert (blocks.place < blocks.shape[blocks.block]).all()
+    assert (layout.sharp | layout.boundary <= blocks.wall).all()
+    inside = np.flatnonzero(~blocks.wall)
+    one, two = layout.edge_quads[inside].T
+    assert (blocks.block[one] == blocks.block[two]).all()
+    assert (np.abs(blocks.place[one] - blocks.place[two]).sum(axis=1) == 1).all()

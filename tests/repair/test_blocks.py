@@ -6,43 +6,14 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from quad_shapes import Marks, SphereTarget, layout_from_quads, sphere_layout
+from quad_shapes import Marks, SphereTarget, assert_rectangles, layout_from_quads, sheet, sphere_layout, torus_layout
 
 from patchwright.models.errors import GeometryError
 from patchwright.models.tolerance import Tolerance
 from patchwright.repair.block_grid import block_grid
-from patchwright.repair.blocks import Blocks, find_blocks, smallest_corner
+from patchwright.repair.blocks import find_blocks, smallest_corner
 from patchwright.repair.patch_fit import Target
-from patchwright.repair.quad_layout import QuadLayout
 from patchwright.repair.resurface import resurface
-
-
-def sheet(columns: int, rows: int, holes: tuple[tuple[int, int], ...] = (), bend: bool = False) -> QuadLayout:
-    """A flat sheet of unit quads, rolled into a tube in x when `bend`, without the quads in `holes`."""
-    width = columns if bend else columns + 1
-    i, j = np.meshgrid(np.arange(width), np.arange(rows + 1), indexing="ij")
-    angle = 2 * np.pi * i / columns
-    points = np.stack([np.cos(angle), j, np.sin(angle)], -1) if bend else np.stack([i, j, 0 * i], -1)
-    quads = [
-        [a % width * (rows + 1) + b for a, b in ((i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1))]
-        for i in range(columns)
-        for j in range(rows)
-        if (i, j) not in holes
-    ]
-    vertices = points.reshape(-1, 3).astype(np.float64)
-    return layout_from_quads(vertices, np.array(quads), lambda a, b: vertices[[a, b]])
-
-
-def assert_rectangles(layout: QuadLayout, blocks: Blocks) -> None:
-    """Every block holds each of its places once, and its quads meet where their places do."""
-    key = np.column_stack([blocks.block, blocks.place])
-    assert len(np.unique(key, axis=0)) == len(layout) == blocks.shape.prod(axis=1).sum()
-    assert (blocks.place < blocks.shape[blocks.block]).all()
-    assert (layout.sharp | layout.boundary <= blocks.wall).all()
-    inside = np.flatnonzero(~blocks.wall)
-    one, two = layout.edge_quads[inside].T
-    assert (blocks.block[one] == blocks.block[two]).all()
-    assert (np.abs(blocks.place[one] - blocks.place[two]).sum(axis=1) == 1).all()
 
 
 @pytest.mark.parametrize("n", [1, 2, 5])
@@ -57,12 +28,7 @@ def test_a_blown_up_cube_is_six_blocks(n):
 def test_rings_are_cut_open():
     tube = find_blocks(sheet(7, 3, bend=True))
     assert sorted(map(sorted, tube.shape.tolist())) == [[3, 7]]
-    i, j = np.meshgrid(np.arange(6), np.arange(5), indexing="ij")
-    number = np.stack([i % 6 * 5 + j % 5, (i + 1) % 6 * 5 + j, (i + 1) % 6 * 5 + (j + 1) % 5, i * 5 + (j + 1) % 5], -1)
-    u, v = i * np.pi / 3, j * 2 * np.pi / 5
-    ring = np.stack([(3 + np.cos(v)) * np.cos(u), (3 + np.cos(v)) * np.sin(u), np.sin(v)], -1).reshape(-1, 3)
-    torus = layout_from_quads(ring, number.reshape(-1, 4), lambda a, b: ring[[a, b]])
-    assert sorted(map(sorted, find_blocks(torus).shape.tolist())) == [[5, 6]]
+    assert sorted(map(sorted, find_blocks(torus_layout(6, 5)).shape.tolist())) == [[5, 6]]
 
 
 def test_a_hole_makes_t_junctions_and_whole_faces_cost_more_blocks():

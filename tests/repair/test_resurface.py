@@ -7,6 +7,8 @@ import pytest
 from quad_shapes import Marks, SphereTarget, sphere_layout
 
 from patchwright.models.tolerance import Tolerance
+from patchwright.repair.block_faces import block_faces
+from patchwright.repair.blocks import single_blocks
 from patchwright.repair.network_seams import measure
 from patchwright.repair.patch_fit import Target
 from patchwright.repair.resurface import resurface
@@ -90,7 +92,11 @@ def test_the_grid_agrees_node_for_node_and_the_surfaces_with_the_nets():
 
 def test_the_topology_runs_every_pcurve_with_its_edge():
     network = network_of(1, 1e-3)
-    topology, surfaces = network.topology(), network.surfaces()
+    made = block_faces(network, single_blocks(network.layout))
+    topology, surfaces = made.topology, made.surfaces
+    assert all(
+        np.array_equal(a.control_points, b.control_points) for a, b in zip(surfaces, network.surfaces(), strict=True)
+    )
     assert (topology.use_counts() == 2).all()
     t = np.linspace(0, 1, 7)
     for surface, ((loop),) in zip(surfaces, topology.loops, strict=True):
