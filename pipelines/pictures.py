@@ -106,7 +106,8 @@ def _coordinates(where: Array) -> str:
 def _after(study: Study, repaired: Repaired) -> list[Scene]:
     body, colours, borders = output_surface(repaired)
     scene = Scene(study.folder / "after.png", f"after: {repaired.verdict.value}", body.bounds)
-    scene.surface(body, colours=colours).lines(borders, colour="#33475a", width=1.2)
+    scene.surface(body, colours=colours)
+    scene.lines(joints(repaired), colour="#8fa9bd", width=0.8).lines(borders, colour="#33475a", width=1.4)
     scenes = [scene]
     if repaired.verdict is not Verdict.CLEAN and repaired.network is not None:
         from patchwright.models.tree import Tree
@@ -120,7 +121,7 @@ def _after(study: Study, repaired: Repaired) -> list[Scene]:
 
 
 def output_surface(repaired: Repaired) -> tuple[Triangulation, Any, Array]:
-    """Triangles of the output, their colours by rung, and the patch borders as segments."""
+    """Triangles of the output, their colours by rung, and the borders of the faces as segments (k, 2, 3)."""
     if repaired.network is None:
         body = repaired.triangulation
         colours = np.tile(np.array(KEPT_COLOUR, dtype=np.uint8), (len(body), 1))
@@ -135,8 +136,20 @@ def output_surface(repaired: Repaired) -> tuple[Triangulation, Any, Array]:
 
     colours = np.tile(np.array(PATCH_COLOUR, dtype=np.uint8), (len(body), 1))
     colours[network_invented(network, intervals)] = INVENTED_COLOUR
-    along = network.edges.sample(9)
-    return body, colours, np.stack([along[:, :-1], along[:, 1:]], axis=2).reshape(-1, 2, 3)
+    return body, colours, _edge_segments(repaired, joined=False)
+
+
+def joints(repaired: Repaired) -> Array:
+    """(k, 2, 3) segments along the joints of patches inside the faces."""
+    return _edge_segments(repaired, joined=True) if repaired.network is not None else np.zeros((0, 2, 3))
+
+
+def _edge_segments(repaired: Repaired, *, joined: bool) -> Array:
+    """(k, 2, 3) along the seams of fitted patches that lie inside faces, or between them."""
+    assert repaired.network is not None
+    inside = np.array([len(seam.faces) == 2 and seam.faces[0] == seam.faces[1] for seam in repaired.seams])
+    along = repaired.network.edges.sample(9)[inside == joined]
+    return np.stack([along[:, :-1], along[:, 1:]], axis=2).reshape(-1, 2, 3)
 
 
 def free_edges(body: Triangulation) -> Array:
