@@ -62,6 +62,8 @@ class FreeEdges:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Pairs:
+    """Pairs of free edges: left < right, how far apart their ends are, and of what kind; all (k,)."""
+
     left: IntArray
     right: IntArray
     gap: Array
@@ -72,24 +74,39 @@ class _Pairs:
 class Copies:
     """Free edges of a triangulation that may be copies of each other: found once, for all distances up to one.
 
-    `labels` (n,) are the exact copies of its vertices, `pairs` the candidates within `distance`.
+    `labels` (n,) are the exact copies of its vertices, `triangles` (m, 3) its triangles over those, `offsets` (n + 1,)
+    and `around` the triangles round each vertex, `pairs` the candidates within `distance`.
     """
 
     labels: IntArray
+    triangles: IntArray
+    offsets: IntArray
+    around: IntArray
     free: FreeEdges
     pairs: _Pairs
     distance: float
 
     @classmethod
-    def of(cls, triangulation: Triangulation, distance: float) -> Copies:
-        """The candidates within `distance` (0: none)."""
-        labels = exact_labels(triangulation.vertices)
-        free = free_edges(labels[triangulation.triangles], triangulation.tags)
-        return cls(labels, free, _candidates(triangulation.vertices, free, distance), distance)
+    def of(cls, triangulation: Triangulation, distance: float, labels: IntArray | None = None) -> Copies:
+        """The candidates within `distance` (0: none); `labels` when it is known already which vertices are one."""
+        points = triangulation.vertices
+        labels = exact_labels(points) if labels is None else labels
+        triangles = labels[triangulation.triangles]
+        free = free_edges(triangles, triangulation.tags)
+        offsets, around = _around(triangles, len(points))
+        return cls(labels, triangles, offsets, around, free, _candidates(points, free, distance), distance)
 
-    def within(self, distance: float) -> _Pairs:
-        """The candidates within a distance, in the order they should be tried."""
-        return _ordered(self.pairs, distance)
+    def matched(self, points: Array, distance: float) -> tuple[IntArray, Array]:
+        """Match the edges within a distance: each vertex's root (n,), and how far apart the matched pairs are."""
+        from patchwright.repair._near_edges_kernel import trial_order
+        from patchwright.repair._weld_kernel import match_edges
+
+        pairs, free = self.pairs, self.free
+        order = trial_order(pairs.gap, pairs.kind, distance, ORIENTED)
+        return match_edges(
+            order, pairs.left, pairs.right, pairs.gap, pairs.kind, free.start, free.end, 1.5 * distance, points,
+            self.triangles, self.offsets, self.around,
+        )  # fmt: skip
 
 
 def reach_of(tolerance: Tolerance) -> float:
@@ -114,7 +131,8 @@ def weld(triangulation: Triangulation, distance: float, copies: Copies | None = 
         copies = None
     if distance > 0.0 and len(triangulation):
         for turn in range(3):
-            step = _weld_step(root, triangulation, distance, copies if turn == 0 else None)
+            known = copies if turn == 0 and copies is not None else Copies.of(triangulation, distance, root)
+            step = _weld_step(known, triangulation, distance)
             if step is None:
                 break
             root = step[root]
@@ -240,30 +258,12 @@ def free_edges(triangles: IntArray, tags: IntArray | None) -> FreeEdges:
 
 def _candidates(points: Array, free: FreeEdges, distance: float) -> _Pairs:
     """Pairs of free edges whose ends lie within `distance`."""
-    from patchwright.repair._weld_kernel import edge_candidates
+    from patchwright.repair._near_edges_kernel import near_edges
 
     if distance <= 0.0 or not len(free.start):
         nothing = np.zeros(0, dtype=np.int64)
         return _Pairs(nothing, nothing, np.zeros(0), nothing)
-    partner, gap, kind = edge_candidates(
-        points[free.start], points[free.end], points[free.apex], free.tag, distance, REACH_SHARE
-    )
-    found = np.flatnonzero((partner >= 0) & ((kind & 5) != 5))  # folded and run the same way: a double, not a neighbour
-    left, right = found // partner.shape[1], partner.reshape(-1)[found]
-    return _Pairs(left, right, gap.reshape(-1)[found], kind.reshape(-1)[found])
-
-
-def _ordered(pairs: _Pairs, distance: float) -> _Pairs:
-    """The candidates within `distance` in the order they should be tried."""
-    left, right, gap, kind = pairs.left, pairs.right, pairs.gap, pairs.kind
-    near = gap <= distance
-    if not near.all():
-        left, right, gap, kind = left[near], right[near], gap[near], kind[near]
-    against = (kind & 4) > 0
-    if np.count_nonzero(against) < ORIENTED * len(kind):
-        left, right, gap, kind = left[~against], right[~against], gap[~against], kind[~against]
-    order = np.argsort(gap + kind * (2.0 * distance), kind="stable")
-    return _Pairs(left[order], right[order], gap[order], kind[order])
+    return _Pairs(*near_edges(points, free.start, free.end, free.apex, free.tag, distance, REACH_SHARE))
 
 
 def _around(triangles: IntArray, count: int) -> tuple[IntArray, IntArray]:
@@ -277,45 +277,24 @@ def _around(triangles: IntArray, count: int) -> tuple[IntArray, IntArray]:
 
 def _match_gaps(triangulation: Triangulation, distance: float, copies: Copies | None) -> tuple[int, Array]:
     """The number of free edges among exactly merged vertices, and the distances of the pairs that match."""
-    from patchwright.repair._weld_kernel import match_edges
-
     if not len(triangulation):
         return 0, np.zeros(0)
     if copies is None or copies.distance < distance:
         copies = Copies.of(triangulation, distance)
-    points, free = triangulation.vertices, copies.free
-    if distance <= 0.0 or not len(free.start):
-        return len(free.start), np.zeros(0)
-    triangles = copies.labels[triangulation.triangles]
-    pairs = copies.within(distance)
-    offsets, around = _around(triangles, len(points))
-    _, mate = match_edges(
-        pairs.left, pairs.right, pairs.kind, free.start, free.end, 1.5 * distance, points, triangles,
-        offsets, around,
-    )  # fmt: skip
-    e = np.flatnonzero(mate > np.arange(len(mate)))
-    f = mate[e]
-    a, b = points[free.start], points[free.end]
-    cross = np.maximum(np.linalg.norm(a[e] - b[f], axis=1), np.linalg.norm(b[e] - a[f], axis=1))
-    along = np.maximum(np.linalg.norm(a[e] - a[f], axis=1), np.linalg.norm(b[e] - b[f], axis=1))
-    return len(free.start), np.minimum(cross, along)
+    if distance <= 0.0 or not len(copies.free.start):
+        return len(copies.free.start), np.zeros(0)
+    return len(copies.free.start), copies.matched(triangulation.vertices, distance)[1]
 
 
-def _weld_step(root: IntArray, triangulation: Triangulation, distance: float, copies: Copies | None) -> IntArray | None:
+def _weld_step(copies: Copies, triangulation: Triangulation, distance: float) -> IntArray | None:
     """One round of edge matching, then of the rims' vertices; each vertex's new root, None when nothing merged."""
-    from patchwright.repair._weld_kernel import match_edges, match_points
+    from patchwright.repair._weld_kernel import match_points
 
-    points, triangles = triangulation.vertices, root[triangulation.triangles]
-    free = free_edges(triangles, triangulation.tags) if copies is None else copies.free
-    if not len(free.start):
+    points = triangulation.vertices
+    if not len(copies.free.start):
         return None
-    pairs = _ordered(_candidates(points, free, distance), distance) if copies is None else copies.within(distance)
-    offsets, around = _around(triangles, len(points))
-    step, _ = match_edges(
-        pairs.left, pairs.right, pairs.kind, free.start, free.end, 1.5 * distance, points, triangles, offsets,
-        around,
-    )  # fmt: skip
-    triangles = step[triangles]
+    step, _ = copies.matched(points, distance)
+    triangles = step[copies.triangles]
     free = free_edges(triangles, triangulation.tags)
     left, right = _point_pairs(points, free, distance)
     if len(left):

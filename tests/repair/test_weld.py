@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from patchwright.models import ParameterError, Tolerance, Triangulation
+from patchwright.repair._near_edges_kernel import CANDIDATES, _pairs_within, trial_order
 from patchwright.repair.weld import free_edge_curve, weld, weld_distance
 
 
@@ -43,6 +44,53 @@ def test_scale_changes_nothing(scale: float) -> None:
     assert np.array_equal(one.clusters, other.clusters)
     distance = weld_distance(dirty, Tolerance.of(dirty))[0]
     assert weld_distance(big, Tolerance.of(big))[0] == pytest.approx(scale * distance, rel=1e-6)
+
+
+@pytest.mark.parametrize("jitter", [1e-4, 3e-3, 1e-2])
+def test_the_order_of_the_triangles_changes_nothing(jitter: float) -> None:
+    dirty = shapes.soup(shapes.sphere(3), jitter)
+    shuffle = np.random.default_rng(0).permutation(len(dirty))
+    one = weld(dirty, 2.0 * jitter).triangulation.triangles[shuffle].reshape(-1)
+    other = weld(Triangulation(dirty.vertices, dirty.triangles[shuffle]), 2.0 * jitter).triangulation.triangles
+    pairs = np.unique(np.stack([one, other.reshape(-1)], axis=1), axis=0)
+    assert len(pairs) == len(np.unique(one)) == len(np.unique(other))
+
+
+def test_near_edges_are_those_of_the_definition() -> None:
+    # edges so far apart in size and place that they lie in many grids; all pairs of ends measured one by one
+    rng = np.random.default_rng(1)
+    a = rng.uniform(-1.0, 1.0, (120, 3))
+    b = a + rng.normal(size=a.shape) * 10.0 ** rng.uniform(-3, -0.5, (120, 1))
+    noise = rng.normal(size=(2, 120, 3)) * 0.1 * np.linalg.norm(b - a, axis=1)[:, None]
+    start, end = np.concatenate([a, b + noise[0]]), np.concatenate([b, a + noise[1]])
+    points = np.concatenate([start, end, 0.5 * (start + end) + rng.normal(size=start.shape)])
+    number = np.arange(240)
+    left, right, gap, _ = _pairs_within(points, number, number + 240, number + 480, 0 * number, 0.2, 0.5)
+    ends = np.stack([start, end], axis=1)
+    along = np.linalg.norm(ends[:, None] - ends, axis=3).max(axis=2)
+    cross = np.linalg.norm(ends[:, None] - ends[:, ::-1], axis=3).max(axis=2)
+    apart = np.minimum(along, cross)
+    reach = np.minimum(0.2, 0.5 * np.linalg.norm(end - start, axis=1))
+    close = np.triu(apart <= np.minimum(reach[:, None], reach), 1)
+    assert (close.sum(axis=0) + close.sum(axis=1)).max() <= CANDIDATES
+    found = np.zeros_like(close)
+    found[left, right] = True
+    assert close.sum() > 60
+    assert not (found & ~close).any()
+    assert np.allclose(gap, apart[left, right], rtol=1e-12)
+    assert (along < cross)[close & ~found].all()  # doubles: folded and run the same way
+
+
+def test_pairs_are_tried_by_kind_and_near_ones_first() -> None:
+    rng = np.random.default_rng(2)
+    gap, kind = 10.0 ** rng.uniform(-8, 0.5, 1000), rng.integers(0, 8, 1000)
+    order = trial_order(gap, kind, 1.0, 0.0)
+    assert np.array_equal(np.sort(order), np.flatnonzero(gap <= 1.0))
+    assert (np.diff(kind[order]) >= 0).all()
+    for k in range(8):
+        own = gap[order][kind[order] == k]
+        assert (own * np.sqrt(2.0) * (1.0 + 1e-12) >= np.maximum.accumulate(own)).all()
+    assert (kind[trial_order(gap, kind, 1.0, 0.6)] < 4).all()
 
 
 def test_the_two_skins_of_a_thin_plate_stay_apart() -> None:
