@@ -9,6 +9,35 @@ from patchwright.models._compile_kernel import filling
 from patchwright.models.arrays import Array, BoolArray, IntArray
 
 
+def triangle_heights(points: Array, triangles: IntArray) -> Array:
+    """(m,) the height of each triangle over its longest side: twice the area over that length, 0 without length."""
+    heights = np.empty(len(triangles))
+    _triangle_heights(points, triangles, heights)
+    return heights
+
+
+@filling
+def _triangle_heights(points: Array, triangles: IntArray, heights: Array) -> None:
+    for t in range(len(triangles)):
+        a = triangles[t, 0]
+        b = triangles[t, 1]
+        c = triangles[t, 2]
+        ux = points[b, 0] - points[a, 0]
+        uy = points[b, 1] - points[a, 1]
+        uz = points[b, 2] - points[a, 2]
+        vx = points[c, 0] - points[a, 0]
+        vy = points[c, 1] - points[a, 1]
+        vz = points[c, 2] - points[a, 2]
+        nx = uy * vz - uz * vy
+        ny = uz * vx - ux * vz
+        nz = ux * vy - uy * vx
+        wx = vx - ux
+        wy = vy - uy
+        wz = vz - uz
+        longest = max(ux * ux + uy * uy + uz * uz, vx * vx + vy * vy + vz * vz, wx * wx + wy * wy + wz * wz)
+        heights[t] = np.sqrt(nx * nx + ny * ny + nz * nz) / np.sqrt(longest) if longest > 0.0 else 0.0
+
+
 def sector_partners(
     edges: IntArray, offsets: IntArray, users: IntArray, points: Array, triangles: IntArray
 ) -> tuple[IntArray, IntArray]:

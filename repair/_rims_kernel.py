@@ -24,6 +24,8 @@ def facing(
     low: Array,
     high: Array,
     reach: Array,
+    first: IntArray,
+    others: IntArray,
     near: float,
     share: float,
     cosine: float,
@@ -36,7 +38,8 @@ def facing(
     Samples: `points`, `outward` (s, 3), `loop`, `edge` (s,) the loop and rim edge each lies on, `span` (s,) the length
     of that edge, `place` (s,) the arc length up to it. Rim edges: `start`, `end`, `edge_outward` (e, 3), those of loop
     l are offsets[l]:offsets[l + 1]; `begin` (e + 1,) the arc length up to each.
-    Loops: boxes `low`, `high` (l, 3), `reach` (l,) how far a sample of a loop looks for other loops.
+    Loops: boxes `low`, `high` (l, 3), `reach` (l,) how far a sample of a loop looks for other loops, and which have
+    boxes so near, its own among them: others[first[l]:first[l + 1]], rising.
     `near`: so close, edges of other places face each other whatever their directions; within `share` of the edges'
     length they do when the surface continues; else the way across must leave both surfaces within acos(`cosine`) of
     straight ahead, and the surface must not turn by more than acos(`fold`) across. Two places of one rim must be at
@@ -44,10 +47,9 @@ def facing(
     or of a saw's tooth do not face each other.
     """
     found, way = np.full(len(points), -1, dtype=np.int64), np.full(len(points), np.inf)
-    room = np.empty(len(reach), dtype=np.int64)
     _facing(
-        points, outward, loop, edge, span, place, offsets, begin, start, end, edge_outward, low, high, reach, near,
-        share, cosine, fold, bend, apart_share, room, found, way,
+        points, outward, loop, edge, span, place, offsets, begin, start, end, edge_outward, low, high, reach, first,
+        others, near, share, cosine, fold, bend, apart_share, found, way,
     )  # fmt: skip
     return found, way
 
@@ -79,28 +81,19 @@ def _facing(
     low: Array,
     high: Array,
     reach: Array,
+    first: IntArray,
+    others: IntArray,
     near: float,
     share: float,
     cosine: float,
     fold: float,
     bend: float,
     apart_share: float,
-    candidates: IntArray,
     found: IntArray,
     way: Array,
 ) -> None:
-    loops = len(reach)
-    current = -1
-    total = 0
     for s in range(len(points)):
         own = loop[s]
-        if own != current:
-            current = own
-            total = 0
-            for other in range(loops):
-                if other == own or _box_distance(low, high, low, high, own, other) <= reach[own] * reach[own]:
-                    candidates[total] = other
-                    total += 1
         px = points[s, 0]
         py = points[s, 1]
         pz = points[s, 2]
@@ -109,8 +102,8 @@ def _facing(
         oz = outward[s, 2]
         size = offsets[own + 1] - offsets[own]
         around = begin[offsets[own + 1]] - begin[offsets[own]]
-        for c in range(total):
-            other = candidates[c]
+        for c in range(first[own], first[own + 1]):
+            other = others[c]
             limit = min(way[s], reach[own]) if other != own else way[s]
             if _box_distance(low, high, points, points, s, other) > limit * limit:
                 continue

@@ -81,11 +81,11 @@ def drop_hanging_flats(triangulation: Triangulation, height: float) -> Cleaned:
     ----------
     height : up to this a triangle counts as flat, a length
     """
+    from patchwright.repair._clean_kernel import triangle_heights
+
     current, parents = triangulation, np.arange(len(triangulation))
     while len(current):
-        corners = current.corners
-        longest = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2).max(axis=1)
-        flat = 2.0 * current.areas <= height * longest
+        flat = triangle_heights(current.vertices, current.triangles) <= height
         if not flat.any():
             break
         adjacency = Adjacency.of(current)
@@ -94,7 +94,9 @@ def drop_hanging_flats(triangulation: Triangulation, height: float) -> Cleaned:
         if not flat.any():
             break
         current, parents = current.take(~flat), parents[~flat]
-    return Cleaned(current, parents, np.setdiff1d(np.arange(len(triangulation)), parents))
+    gone = np.ones(len(triangulation), dtype=np.bool_)
+    gone[parents] = False
+    return Cleaned(current, parents, np.flatnonzero(gone))
 
 
 def split_non_manifold(triangulation: Triangulation, *, vertices: bool = True) -> Triangulation:

@@ -5,8 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from patchwright.models.adjacency import Adjacency
-from patchwright.models.arrays import Array
-from patchwright.models.triangulation import Triangulation
 from patchwright.repair.clean import drop_collapsed, drop_duplicates, drop_hanging_flats, split_non_manifold
 from patchwright.repair.conform import conform
 from patchwright.repair.mended import Action, Work, middle
@@ -39,6 +37,8 @@ def weld_copies(work: Work) -> None:
 
 def _below_noise(work: Work, distance: float) -> None:
     """Data with scatter: edges shorter than the scatter cannot be told apart; they go, and what hangs on them."""
+    from patchwright.repair._clean_kernel import triangle_heights
+
     for _ in range(3):
         short = contract_short(work.now, distance)
         if not short.merged:
@@ -50,7 +50,7 @@ def _below_noise(work: Work, distance: float) -> None:
         work.now = weld(work.now, distance).triangulation
     _undouble(work)
     adjacency = Adjacency.of(work.now)
-    height = 2.0 * work.now.areas / np.maximum(_longest(work.now), np.finfo(float).tiny)
+    height = triangle_heights(work.now.vertices, work.now.triangles)
     crowded = adjacency.non_manifold[adjacency.triangle_edges].any(axis=1) & (height < 2.0 * distance)
     if crowded.any():
         gone = np.flatnonzero(crowded)
@@ -122,9 +122,3 @@ def orient_bodies(work: Work) -> None:
             Action("orient", "keep", middle(some), some.diagonal, 0.0, reason, int(oriented.flipped.sum()))
         )
     work.now = oriented.triangulation
-
-
-def _longest(triangulation: Triangulation) -> Array:
-    """(m,) longest edge of each triangle."""
-    corners = triangulation.corners
-    return np.asarray(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1, initial=0.0))

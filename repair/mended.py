@@ -10,7 +10,7 @@ import numpy as np
 from patchwright.models.arrays import Array, BoolArray, IntArray
 from patchwright.models.tolerance import Tolerance
 from patchwright.models.triangulation import Triangulation
-from patchwright.repair.crossings import CROSSING, crossing_pairs
+from patchwright.repair.crossings import CROSSING, crossing_pairs, crossing_pairs_after
 
 if TYPE_CHECKING:
     from patchwright.repair.decisions import Decisions
@@ -98,6 +98,11 @@ class Mended:
     problems: tuple[Problem, ...]
 
 
+Mark = tuple[
+    Triangulation, IntArray, IntArray, tuple[Triangulation, IntArray] | None, IntArray | None, int, int
+]  # fmt: skip
+
+
 @dataclass(slots=True)
 class Work:
     """The triangulation on its way through the stages."""
@@ -114,11 +119,19 @@ class Work:
     distance: float = 0.0  # the weld distance
     decisions: Decisions | None = None  # what stays as it is
     crossed: tuple[Triangulation, IntArray] | None = None  # the last triangulation asked for crossings, and those
+    trace: IntArray | None = None  # (m,) the triangle of that one each triangle is, -1 for new ones
 
     def crossings(self) -> IntArray:
         """(k, 2) pairs of triangles of the present state that pass through each other."""
         if self.crossed is None or self.crossed[0] is not self.now:
-            self.crossed = self.now, crossing_pairs(self.now, CROSSING * self.tolerance.gap)
+            depth = CROSSING * self.tolerance.gap
+            if self.crossed is None or self.trace is None or len(self.trace) != len(self.now):
+                pairs = crossing_pairs(self.now, depth)
+            else:
+                before, known = self.crossed
+                pairs = crossing_pairs_after(self.now, depth, known, _unmoved(before, self.now, self.trace))
+            self.crossed = self.now, pairs
+            self.trace = np.arange(len(self.now))
         return self.crossed[1]
 
     def follow(self, triangulation: Triangulation, parents: IntArray, cut: BoolArray | None = None) -> None:
@@ -128,15 +141,20 @@ class Work:
         origin = np.where(known, self.origin[parents], BRIDGED)
         if cut is not None:
             origin = np.where(cut & (origin == KEPT), CUT, origin)
+        if self.trace is not None:
+            traced = len(self.trace) == len(self.now)
+            whole = known if cut is None else known & ~cut
+            self.trace = np.where(whole, self.trace[parents], -1) if traced else None
         self.now, self.source, self.origin = triangulation, source, origin
 
-    def mark(self) -> tuple[Triangulation, IntArray, IntArray, int, int]:
+    def mark(self) -> Mark:
         """The present state, to come back to."""
-        return self.now, self.source, self.origin, len(self.actions), len(self.dropped)
+        counts = len(self.actions), len(self.dropped)
+        return self.now, self.source, self.origin, self.crossed, self.trace, *counts
 
-    def back(self, mark: tuple[Triangulation, IntArray, IntArray, int, int]) -> None:
+    def back(self, mark: Mark) -> None:
         """Undo everything since `mark`."""
-        self.now, self.source, self.origin, actions, dropped = mark
+        self.now, self.source, self.origin, self.crossed, self.trace, actions, dropped = mark
         del self.actions[actions:], self.dropped[dropped:]
 
     def names(self, triangles: IntArray) -> tuple[str, ...]:
@@ -155,6 +173,18 @@ class Work:
         source = source[source >= 0]
         area = float(some.areas.sum()) if area is None else area
         self.dropped.append(Dropped(what, why, self.names(source), area, middle(some), source, some.diagonal))
+
+
+def _unmoved(before: Triangulation, now: Triangulation, trace: IntArray) -> IntArray:
+    """`trace` with -1 for triangles whose box is not what it was: a cut or welded triangle is a new one."""
+    same = trace.copy()
+    index = np.flatnonzero(trace >= 0)
+    ones, others = before.triangles[trace[index]], now.triangles[index]
+    for axis in range(3):
+        old, new = before.vertices[:, axis][ones], now.vertices[:, axis][others]
+        moved = (old.min(axis=1) != new.min(axis=1)) | (old.max(axis=1) != new.max(axis=1))
+        same[index[moved]] = -1
+    return same
 
 
 def known(source: IntArray) -> IntArray:

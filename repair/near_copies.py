@@ -33,13 +33,13 @@ def near_copies(triangulation: Triangulation, distance: float) -> tuple[Triangul
     from scipy.sparse.csgraph import connected_components
     from scipy.spatial import cKDTree
 
+    from patchwright.repair._clean_kernel import triangle_heights
+
     none = np.zeros(0, dtype=np.int64)
     if not Adjacency.of(triangulation).free.any():
         return triangulation, none
     corners = triangulation.corners
-    edges = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
-    height = 2.0 * triangulation.areas / np.maximum(edges.max(axis=1, initial=0.0), np.finfo(float).tiny)
-    able = np.flatnonzero(height > ROOM * distance)
+    able = np.flatnonzero(triangle_heights(triangulation.vertices, triangulation.triangles) > ROOM * distance)
     if not len(able) or distance <= 0.0:
         return triangulation, none
     pairs = cKDTree(corners[able].mean(axis=1)).query_pairs(distance, output_type="ndarray")

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from patchwright.models.arrays import Array, IntArray
+from patchwright.models.tree import Tree
+from patchwright.models.triangulation import Triangulation
 
 AHEAD = 0.5  # cosine: the way across leaves within 60 degrees of straight ahead
 FOLD = -0.2  # cosine: a missing edge or corner of a box turns the surface by 90 degrees, two skins of a blade by 180
@@ -107,10 +109,11 @@ def what_faces(edges: RimEdges, facts: LoopFacts, near: float, sense: float) -> 
     everywhere, halfway = np.arange(len(edges.loop)), 0.5 * (begin[:-1] + begin[1:])
     outward = sense * _way_ahead(edges, begin, facts.perimeter, halfway, everywhere)
     ahead = sense * _way_ahead(edges, begin, facts.perimeter, place, edge)
+    reach = np.maximum(WIDE * diameter, near)
     found, way = facing(
         np.ascontiguousarray(points), ahead, owner, edge, edges.length[edge], place, edges.offsets, begin,
         np.ascontiguousarray(edges.start), np.ascontiguousarray(edges.end), outward, facts.low, facts.high,
-        np.maximum(WIDE * diameter, near), near, SEAM, AHEAD, FOLD, BEND, APART,
+        reach, *_within_reach(facts.low, facts.high, reach), near, SEAM, AHEAD, FOLD, BEND, APART,
     )  # fmt: skip
     met = found >= 0
     target = np.where(met, edges.loop[np.maximum(found, 0)], -1)
@@ -128,6 +131,22 @@ def what_faces(edges: RimEdges, facts: LoopFacts, near: float, sense: float) -> 
         best = np.lexsort((votes, pair // loops))
         partner[pair[best] // loops] = pair[best] % loops
     return Facing(share, partner, width, widest)
+
+
+def _within_reach(low: Array, high: Array, reach: Array) -> tuple[IntArray, IntArray]:
+    """Offsets (l + 1,) and the boxes that each of `low`, `high` (l, 3) touches when it is widened by its `reach` (l,).
+
+    A box is the box of a triangle over its two corners: what a tree of triangles finds.
+    """
+    loops = len(low)
+    slack = (1.0 + 1e-12) * reach[:, None]
+    trees = []
+    for lowest, highest in ((low - slack, high + slack), (low, high)):
+        corners = np.arange(loops)[:, None] + np.array([0, loops, loops])
+        trees.append(Tree.of(Triangulation(np.concatenate([lowest, highest]), corners)))
+    pairs = trees[0].pairs(trees[1])
+    first = np.concatenate([[0], np.cumsum(np.bincount(pairs[:, 0], minlength=loops))]).astype(np.int64)
+    return first, np.ascontiguousarray(pairs[:, 1])
 
 
 def _way_ahead(edges: RimEdges, begin: Array, perimeter: Array, place: Array, edge: IntArray) -> Array:

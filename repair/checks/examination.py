@@ -104,10 +104,9 @@ class Examination:
     @cached_property
     def flat(self) -> BoolArray:
         """(m,) triangles of `raw` with three corners but no height beyond the rounding of their coordinates."""
-        corners = self.raw.corners
-        longest = np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2).max(axis=1)
-        area = self.raw.areas
-        height = np.divide(2.0 * area, longest, out=np.zeros_like(area), where=longest > 0.0)
+        from patchwright.repair._clean_kernel import triangle_heights
+
+        height = triangle_heights(self.raw.vertices, self.raw.triangles)
         rounding = 4.0 * float(np.finfo(np.float64).eps) * float(np.abs(self.raw.bounds).max())
         return np.asarray((height <= rounding) & ~two_corners(self.merged.triangles))
 
