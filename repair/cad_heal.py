@@ -17,6 +17,7 @@ from patchwright.models.cad.sewing import sew
 from patchwright.models.cad.status import brep_status
 from patchwright.models.errors import EngineError
 from patchwright.repair.cad_draft import Attempt, Change, Draft, Limits
+from patchwright.repair.carried_on import join_carried_on
 from patchwright.repair.face_steps import built, folds, free_edges, in_vain, mended_faces, widest
 from patchwright.repair.free_edges import on_own_surfaces
 from patchwright.repair.loose_seams import opened
@@ -132,8 +133,11 @@ def _climbed(
         draft, again = retrim(draft, limits, crossing=False)
         moved_back = {face for change in put_back for face in change.faces}
         changes = (*changes, *put_back, *(c for c in again if not moved_back & set(c.faces)))
-    draft, joined = join_seams(draft, limits, after)
-    changes = (*changes, *joined)
+    draft, joined = join_seams(draft, limits, after, crossing=False)
+    draft, sized = realign(draft, limits, sized=True)
+    draft, more = join_seams(draft, limits, after)
+    draft, carried = join_carried_on(draft, limits)
+    changes = (*changes, *joined, *sized, *more, *carried)
     if crossing:
         draft, crossed = retrim(draft, limits)
         changes = (*changes, *crossed)

@@ -1,8 +1,8 @@
 """Put a displaced piece back: one rigid motion that lays its border onto the border of the hole it left.
 
 A face (or a sewn group of faces) that was shifted or turned as a whole still has the shape of its hole; one that no
-motion fits may have shrunk or grown, and then a similarity is looked for: a plane stays the plane it is, and only its
-trims move. The motion is
+motion fits may have shrunk or grown, and a similarity is looked for when asked: a plane stays the plane it is, and only
+its trims move. The motion is
 found from the rims alone: differences of corners propose shifts, Gauss-Newton on the distances along the normals of
 the target curves finishes (Chen and Medioni, Object modelling by registration of multiple range images, 1992, for
 curves), every distance weighed down by its own size, so that stretches without a counterpart, where the neighbour was
@@ -74,8 +74,12 @@ class _Fit:
     share: float
 
 
-def realign(draft: Draft, limits: Limits) -> tuple[Draft, tuple[Change, ...]]:
-    """Every loose piece that one rigid motion fits into the hole it left; the largest piece stays where it is."""
+def realign(draft: Draft, limits: Limits, *, sized: bool = False) -> tuple[Draft, tuple[Change, ...]]:
+    """Every loose piece that one rigid motion fits into the hole it left; the largest piece stays where it is.
+
+    `sized` allows a change of size too. Rings and rectangles of any size fit each other, so that is weak evidence where
+    trims can be carried on to the neighbours instead: it is for what is left after that.
+    """
     topology, owner = draft.topology, draft.owners()
     groups = components(topology)
     areas = [sum(_size(draft, face) for face in group) for group in groups]
@@ -83,7 +87,6 @@ def realign(draft: Draft, limits: Limits) -> tuple[Draft, tuple[Change, ...]]:
     largest = int(np.argmax(areas))
     changes: list[Change] = []
     loose = [k for k in range(len(groups)) if k != largest]
-    sized = False
     while not limits.expired:  # a piece put back completes the holes of its neighbours
         best: tuple[float, int, list[int], _Fit] | None = None
         for number in loose:
@@ -97,11 +100,7 @@ def realign(draft: Draft, limits: Limits) -> tuple[Draft, tuple[Change, ...]]:
             if fit is not None and (best is None or fit.share * rims.length > best[0]):
                 best = fit.share * rims.length, number, own, fit
         if best is None:
-            if sized:
-                break
-            sized = True
-            continue
-        sized = False
+            break
         change, draft = _put_back(draft, groups[best[1]], best[2], best[3], limits)
         changes.append(change)
         loose.remove(best[1])

@@ -23,12 +23,12 @@ from patchwright.repair.face_sides import one_sided
 from patchwright.repair.loop_shape import in_step, simple
 from patchwright.repair.pcurves import below, inside
 from patchwright.repair.result import Rung
-from patchwright.repair.seam_curves import Judged, Meeting, common, judged, reattached, track, uses_of
+from patchwright.repair.seam_curves import EXACT, Judged, Meeting, common, judged, reattached, track, uses_of
 from patchwright.repair.seam_nodes import Nodes, placed
 from patchwright.repair.seam_pieces import Cut, Piece, cut, seams
 
 FINE = (1e-6, 1e-5, 1e-4)  # of the diagonal: reaches at which a file's own precision may have left its edges
-COARSE = (3e-4, 1e-3, 3e-3, 1e-2)  # of the diagonal: reaches beyond it, tried after displaced faces have been put back
+COARSE = (3e-4, 1e-3, 3e-3, 1e-2, 3e-2)  # of the diagonal: reaches beyond it, tried after faces have been put back
 TIGHT = 10.0  # of the rungs' finest length: how near a new pcurve follows its edge
 ROUNDS = 8  # times a reach is tried again with the seams left out that do not hold
 
@@ -61,24 +61,31 @@ class _Work:
         self.edges.append(edge)
 
 
-def join_seams(draft: Draft, limits: Limits, shares: tuple[float, ...] = FINE) -> tuple[Draft, tuple[Change, ...]]:
-    """Every seam whose faces meet in a curve near their edges, at each share of the diagonal in turn."""
+def join_seams(
+    draft: Draft, limits: Limits, shares: tuple[float, ...] = FINE, *, crossing: bool = True
+) -> tuple[Draft, tuple[Change, ...]]:
+    """Every seam whose faces meet in a curve near their edges, at each share of the diagonal in turn.
+
+    Without `crossing` only edges that lie on the other face to round-off count.
+    """
     changes: list[Change] = []
     for share in shares:
         if limits.expired:
             break
-        draft, more = _joined(draft, share * limits.diagonal, limits)
+        draft, more = _joined(draft, share * limits.diagonal, limits, crossing)
         changes += more
     if changes:
         draft = replace(draft, topology=one_sided(draft.topology))
     return draft, tuple(changes)
 
 
-def _joined(draft: Draft, reach: float, limits: Limits) -> tuple[Draft, tuple[Change, ...]]:
+def _joined(draft: Draft, reach: float, limits: Limits, crossing: bool) -> tuple[Draft, tuple[Change, ...]]:
     whole = cut(draft, reach)
     uses = uses_of(draft)
     found = [judged(draft, seam, uses, limits) for seam in seams(draft, whole, reach)]
     found = [one for one in found if one.meeting in (Meeting.LIES, Meeting.CROSS)]
+    if not crossing:
+        found = [one for one in found if one.apart <= EXACT * limits.on]
     for _ in range(ROUNDS):
         if not found or limits.expired:
             break

@@ -1,4 +1,7 @@
-"""The places of the nodes where seams end: on every surface there, and on the edges that lead seams through them."""
+"""The places of the nodes where seams end: on every surface there, and on the edges that lead seams through them.
+
+Where an edge that leads ends on all of them already, that end is the place: what is sound stays.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +15,7 @@ from patchwright.models.surface import Surface
 from patchwright.models.topology import Topology
 from patchwright.repair.cad_draft import Draft, Limits
 from patchwright.repair.meeting import farthest, on_all
-from patchwright.repair.seam_curves import Judged, Meeting
+from patchwright.repair.seam_curves import EXACT, Judged, Meeting
 from patchwright.repair.seam_pieces import Cut
 
 
@@ -50,11 +53,13 @@ def placed(draft: Draft, whole: Cut, found: list[Judged], limits: Limits) -> tup
         mine = sorted(v for v, n in bound.items() if n == number)
         faces = {face for one in some for face in one.seam.faces}
         faces |= {face for v in mine for edge in at.get(v, ()) for face in faces_of.get(edge, ())}
-        leads = [one.track for one in some if one.meeting is Meeting.LIES]
-        tips = [one.track(np.array([one.track.domain[k]]))[0] for one in some for k in _at(one, number)]
-        start = topology.vertices[mine].mean(axis=0) if mine else np.mean(tips, axis=0)
+        leading = [one for one in some if one.meeting is Meeting.LIES]
+        tips = _tips(some, number)
+        start = topology.vertices[mine].mean(axis=0) if mine else tips.mean(axis=0)
         surfaces = [draft.surface(face) for face in sorted(faces)]
-        spot = _spot(surfaces, leads, start, limits)
+        spot = _sound(surfaces, _tips(leading, number), limits)
+        if spot is None:
+            spot = _spot(surfaces, [one.track for one in leading], start, limits)
         if spot is None:
             bad |= {id(one) for one in some}
             continue
@@ -68,6 +73,22 @@ def placed(draft: Draft, whole: Cut, found: list[Judged], limits: Limits) -> tup
     for number, spot in place.items():
         vertices[corner[number]] = spot
     return Nodes(place, corner, bound, vertices, held), bad
+
+
+def _tips(some: list[Judged], number: int) -> Array:
+    """(k, 3) where the curves that lead seams end at a node."""
+    return np.array([one.track(np.array([one.track.domain[k]]))[0] for one in some for k in _at(one, number)]).reshape(
+        -1, 3
+    )
+
+
+def _sound(surfaces: list[Surface], tips: Array, limits: Limits) -> Array | None:
+    """The mean of tips that coincide on all surfaces to round-off."""
+    exact = EXACT * limits.on
+    if not len(tips) or float(np.ptp(tips, axis=0).max()) > exact:
+        return None
+    spot = np.asarray(tips.mean(axis=0))
+    return spot if all(farthest(surface, spot[None]) <= exact for surface in surfaces) else None
 
 
 def _spot(surfaces: list[Surface], leads: list[NurbsCurve], start: Array, limits: Limits) -> Array | None:

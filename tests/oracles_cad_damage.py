@@ -84,17 +84,26 @@ def shrunk(face, factor):
 def pulled_back(face, width, which=0):
     """The face without the strip of a width along its longest edge (which=0), the next (1), ...; surface unchanged."""
     edges = [TopoDS.Edge(edge) for edge in parts_of(face, TopAbs_ShapeEnum.TopAbs_EDGE)]
-    edge = sorted(edges, key=length, reverse=True)[which]
-    curve = BRepAdaptor_Curve(edge)
-    start, along = gp_Pnt(), gp_Vec()
-    curve.D1(curve.FirstParameter(), start, along)
-    ring = BRepBuilderAPI_MakeEdge(gp_Circ(gp_Ax2(start, gp_Dir(along)), width)).Edge()
-    disc = BRepBuilderAPI_MakeFace(BRepBuilderAPI_MakeWire(ring).Wire()).Face()
-    tube = BRepOffsetAPI_MakePipe(BRepBuilderAPI_MakeWire(edge).Wire(), disc).Shape()
-    ends = [curve.Value(curve.FirstParameter()), curve.Value(curve.LastParameter())]
+    return without_strips(face, sorted(edges, key=length, reverse=True)[which : which + 1], width)
+
+
+def cut_back(face, width):
+    """The face without the strip of a width along all its edges; surface unchanged."""
+    return without_strips(face, [TopoDS.Edge(edge) for edge in parts_of(face, TopAbs_ShapeEnum.TopAbs_EDGE)], width)
+
+
+def without_strips(face, edges, width):
     left = face
-    for tool in (tube, *(BRepPrimAPI_MakeSphere(end, width).Shape() for end in ends)):
-        left = BRepAlgoAPI_Cut(left, tool).Shape()
+    for edge in edges:
+        curve = BRepAdaptor_Curve(edge)
+        start, along = gp_Pnt(), gp_Vec()
+        curve.D1(curve.FirstParameter(), start, along)
+        ring = BRepBuilderAPI_MakeEdge(gp_Circ(gp_Ax2(start, gp_Dir(along)), width)).Edge()
+        disc = BRepBuilderAPI_MakeFace(BRepBuilderAPI_MakeWire(ring).Wire()).Face()
+        tube = BRepOffsetAPI_MakePipe(BRepBuilderAPI_MakeWire(edge).Wire(), disc).Shape()
+        ends = [curve.Value(curve.FirstParameter()), curve.Value(curve.LastParameter())]
+        for tool in (tube, *(BRepPrimAPI_MakeSphere(end, width).Shape() for end in ends)):
+            left = BRepAlgoAPI_Cut(left, tool).Shape()
     (only,) = faces_of(left)
     return only
 

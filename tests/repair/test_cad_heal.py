@@ -11,6 +11,7 @@ from oracles_cad_damage import (
     ROUNDED_VOLUME,
     SIZES,
     centre,
+    cut_back,
     faces_of,
     loosest,
     pulled_back,
@@ -148,10 +149,10 @@ def test_a_face_turned_within_reach_of_its_neighbours_is_put_back_and_not_trimme
 
 
 def test_a_face_that_fits_nowhere_is_trimmed_where_it_crosses_its_neighbours(tmp_path):
-    # the top, lifted and smaller all round, so that no motion lays its border onto the hole's
+    # the top, lifted and narrower by one width all round, so that no similarity lays its border onto the hole's
     lift = 0.003 * DIAGONAL
     top = max(range(len(FACES)), key=lambda k: centre(FACES[k]).Z())
-    faces = [shifted(shrunk(f, 0.995), (0, 0, lift)) if k == top else f for k, f in enumerate(FACES)]
+    faces = [shifted(cut_back(f, 0.02), (0, 0, lift)) if k == top else f for k, f in enumerate(FACES)]
     path = written(tmp_path / "lifted.step", faces, {top})
     before = read(path)
     result, again = healed(path, tmp_path)
@@ -159,6 +160,31 @@ def test_a_face_that_fits_nowhere_is_trimmed_where_it_crosses_its_neighbours(tmp
     assert len(identical(result, before)) == len(FACES)
     assert again.bounds[1, 2] == pytest.approx(SIZES[2] + lift, abs=1e-9)
     assert volume(again) == pytest.approx(ROUNDED_VOLUME * (SIZES[2] + lift) / SIZES[2], rel=1e-3)
+
+
+@pytest.mark.parametrize("share", [1e-3, pytest.param(1e-2, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    "damage", [lambda face, by: cut_back(face, by * DIAGONAL), lambda face, by: shrunk(face, 1 - by)]
+)
+def test_neighbouring_faces_smaller_on_all_sides_reach_each_other_again(tmp_path, damage, share):
+    # the top, a side and the rounded edge between two sides: planes and a cylinder that touch, cross, share corners
+    which = {5, 0, 6}
+    faces = [damage(f, share) if k in which else f for k, f in enumerate(FACES)]
+    before = read(written(tmp_path / "smaller.step", faces, which))
+    result, again = healed(tmp_path / "smaller.step", tmp_path)
+    is_sound(again, tmp_path / "healed.step")
+    assert len(identical(result, before)) >= len(FACES) - 1  # a cylinder scaled is another cylinder
+    assert solid_volume(read_shape(tmp_path / "healed.step")) == pytest.approx(ROUNDED_VOLUME, rel=1e-9)
+
+
+def test_a_face_lifted_and_shrunk_is_put_back_where_all_its_border_fits(tmp_path):
+    top = max(range(len(FACES)), key=lambda k: centre(FACES[k]).Z())
+    faces = [shifted(shrunk(f, 0.995), (0, 0, 0.04)) if k == top else f for k, f in enumerate(FACES)]
+    result, again = healed(written(tmp_path / "lifted.step", faces, {top}), tmp_path)
+    is_sound(again, tmp_path / "healed.step")
+    assert solid_volume(read_shape(tmp_path / "healed.step")) == pytest.approx(ROUNDED_VOLUME, rel=1e-9)
+    (change,) = [e for e in result.ledger if e.rung == Rung.REALIGN]
+    assert "change of size by 1.00503" in change.reason  # 1 / 0.995
 
 
 def test_a_gap_hidden_in_tolerances_is_taken_apart_and_closed(tmp_path):
