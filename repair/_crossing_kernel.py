@@ -106,3 +106,23 @@ def _crossing(pairs: IntArray, points: Array, triangles: IntArray, depth: float,
             s = t
             t = swap
             mine = yours
+
+
+def same_boxes(old: Array, old_triangles: IntArray, new: Array, new_triangles: IntArray, of: IntArray) -> IntArray:
+    """`of` (m,), the old triangle each new one is, with -1 where their boxes differ to the last bit."""
+    same = of.copy()
+    _same_boxes(old, old_triangles, new, new_triangles, same)
+    return same
+
+
+@filling
+def _same_boxes(old: Array, old_triangles: IntArray, new: Array, new_triangles: IntArray, same: IntArray) -> None:
+    for t in range(len(same)):
+        s = same[t]
+        if s < 0:
+            continue
+        for d in range(3):
+            x, y, z = old[old_triangles[s, 0], d], old[old_triangles[s, 1], d], old[old_triangles[s, 2], d]
+            u, v, w = new[new_triangles[t, 0], d], new[new_triangles[t, 1], d], new[new_triangles[t, 2], d]
+            if min(min(x, y), z) != min(min(u, v), w) or max(max(x, y), z) != max(max(u, v), w):
+                same[t] = -1

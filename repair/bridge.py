@@ -22,6 +22,7 @@ FACING = 0.3  # cosine: rims face each other when the way across leaves both sur
 AGREE = 0.25  # cosine: normals across a gap agree
 SHARE = 0.6  # of a rim's length that must face the other rim
 ASKED = 600  # places of a rim that are asked what lies ahead
+ONE = np.array([[0, 2, 1]])  # fills three points
 WIDE = 0.5  # of the smaller rim's size: a wider void is not a gap
 
 
@@ -156,32 +157,37 @@ def bridge(
 ) -> Bridged:
     """Fill the rims `singles` each by itself and join each of `pairs` by a strip; indices count in `rims`."""
     used = _Edges.of(triangulation, [rims[i].vertices for i in singles])
-    corners: list[IntArray] = []
-    parents: list[IntArray] = []
-    bridges: list[Bridge] = []
+    made: list[tuple[IntArray, IntArray, tuple[IntArray, ...], float | None]] = []  # triangles, parents, rims, width
     failed: list[IntArray] = []
-    points = triangulation.vertices
+    points, tags = triangulation.vertices, triangulation.tags
     for i, j in pairs:
-        made = _strip(rims[i], rims[j])
-        area = _areas(points, made[0])
         width = float(np.linalg.norm(rims[i].middles - _nearest(rims[j], rims[i].middles), axis=1).mean())
-        _note(bridges, corners, parents, made, area, (rims[i].vertices, rims[j].vertices), points, width)
+        made.append((*_strip(rims[i], rims[j]), (rims[i].vertices, rims[j].vertices), width))
     for i in singles:
         rim = rims[i]
-        local = _fill(rim.points, rim.normals, used.chords(rim.vertices))
+        local = ONE if len(rim.vertices) == 3 else _fill(rim.points, rim.normals, used.chords(rim.vertices))
         if local is None:
             failed.append(rim.vertices)
             continue
-        made = rim.vertices[local], np.full(len(local), _main(triangulation.tags, rim.triangles))
-        area = _areas(points, made[0])
-        _note(bridges, corners, parents, made, area, (rim.vertices,), points, float(np.sqrt(area.sum())))
-    if not corners:
+        made.append((rim.vertices[local], np.full(len(local), _main(tags, rim.triangles)), (rim.vertices,), None))
+    if not made:
         return Bridged(triangulation, (), tuple(failed))
-    tags = triangulation.tags
-    if tags is not None:
-        tags = np.concatenate([tags, tags[np.concatenate(parents)]])
-    result = replace(triangulation, triangles=np.concatenate([triangulation.triangles, *corners]), uv=None, tags=tags)
-    return Bridged(result, tuple(bridges), tuple(failed))
+    corners = np.concatenate([one[0] for one in made])
+    parents = np.concatenate([one[1] for one in made])
+    result = replace(
+        triangulation,
+        triangles=np.concatenate([triangulation.triangles, corners]),
+        uv=None,
+        tags=None if tags is None else np.concatenate([tags, tags[parents]]),
+    )
+    starts = np.cumsum([0] + [len(one[0]) for one in made])[:-1]
+    areas = np.add.reduceat(_areas(points, corners), starts)
+    widths = [float(np.sqrt(area)) if one[3] is None else one[3] for one, area in zip(made, areas, strict=True)]
+    bridges = tuple(
+        Bridge(one[2], one[0], float(area), points[np.concatenate(one[2])].mean(axis=0), width)
+        for one, area, width in zip(made, areas, widths, strict=True)
+    )
+    return Bridged(result, bridges, tuple(failed))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -243,7 +249,7 @@ def _fill(points: Array, normals: Array, forbidden: BoolArray) -> IntArray | Non
                 parts.append(some[filled])
             return np.concatenate(parts)
     if len(points) == 3:
-        return np.array([[0, 2, 1]])
+        return ONE
     filled = fill_loop(np.ascontiguousarray(points), np.ascontiguousarray(normals), forbidden)
     return filled if len(filled) else None
 
@@ -318,21 +324,6 @@ def _main(tags: IntArray | None, triangles: IntArray) -> int:
 def _areas(points: Array, triangles: IntArray) -> Array:
     a, b, c = points[triangles[:, 0]], points[triangles[:, 1]], points[triangles[:, 2]]
     return np.asarray(0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1))
-
-
-def _note(
-    bridges: list[Bridge],
-    corners: list[IntArray],
-    parents: list[IntArray],
-    made: tuple[IntArray, IntArray],
-    area: Array,
-    rims: tuple[IntArray, ...],
-    points: Array,
-    width: float,
-) -> None:
-    corners.append(made[0])
-    parents.append(made[1])
-    bridges.append(Bridge(rims, made[0], float(area.sum()), points[np.concatenate(rims)].mean(axis=0), width))
 
 
 def _unit(vectors: Array) -> Array:

@@ -22,14 +22,20 @@ def crossing_pairs(triangulation: Triangulation, depth: float) -> IntArray:
     return _crossing(triangulation, Tree.of(triangulation).touching(), depth)
 
 
-def crossing_pairs_after(triangulation: Triangulation, depth: float, before: IntArray, same: IntArray) -> IntArray:
+def crossing_pairs_after(
+    triangulation: Triangulation, depth: float, earlier: Triangulation, before: IntArray, trace: IntArray
+) -> IntArray:
     """`crossing_pairs` of a triangulation most of which is known: only new triangles are looked at.
 
     Parameters
     ----------
-    before : (k, 2) crossing pairs of an earlier triangulation, within the same depth
-    same : (m,) the triangle of the earlier one with the same corners, -1 for new ones; none twice
+    earlier, before : a triangulation and its crossing pairs (k, 2) at the same depth
+    trace : (m,) the triangle of the earlier one that each triangle is, -1 for new ones, none twice; where its corners
+        have moved since, it counts as new
     """
+    from patchwright.repair._crossing_kernel import same_boxes
+
+    same = same_boxes(earlier.vertices, earlier.triangles, triangulation.vertices, triangulation.triangles, trace)
     fresh = np.flatnonzero(same < 0)
     if 2 * len(fresh) > len(triangulation):
         return crossing_pairs(triangulation, depth)

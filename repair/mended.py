@@ -128,8 +128,7 @@ class Work:
             if self.crossed is None or self.trace is None or len(self.trace) != len(self.now):
                 pairs = crossing_pairs(self.now, depth)
             else:
-                before, known = self.crossed
-                pairs = crossing_pairs_after(self.now, depth, known, _unmoved(before, self.now, self.trace))
+                pairs = crossing_pairs_after(self.now, depth, *self.crossed, self.trace)
             self.crossed = self.now, pairs
             self.trace = np.arange(len(self.now))
         return self.crossed[1]
@@ -173,18 +172,6 @@ class Work:
         source = source[source >= 0]
         area = float(some.areas.sum()) if area is None else area
         self.dropped.append(Dropped(what, why, self.names(source), area, middle(some), source, some.diagonal))
-
-
-def _unmoved(before: Triangulation, now: Triangulation, trace: IntArray) -> IntArray:
-    """`trace` with -1 for triangles whose box is not what it was: a cut or welded triangle is a new one."""
-    same = trace.copy()
-    index = np.flatnonzero(trace >= 0)
-    ones, others = before.triangles[trace[index]], now.triangles[index]
-    for axis in range(3):
-        old, new = before.vertices[:, axis][ones], now.vertices[:, axis][others]
-        moved = (old.min(axis=1) != new.min(axis=1)) | (old.max(axis=1) != new.max(axis=1))
-        same[index[moved]] = -1
-    return same
 
 
 def known(source: IntArray) -> IntArray:

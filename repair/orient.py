@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from patchwright.models.adjacency import Adjacency
-from patchwright.models.arrays import Array, BoolArray, IntArray
+from patchwright.models.arrays import BoolArray, IntArray
 from patchwright.models.triangulation import Triangulation
 
 SOLID = 1e-2  # a component whose volume is below this share of area^(3/2) is a sheet
@@ -39,7 +39,7 @@ class Oriented:
 
 def orient(triangulation: Triangulation) -> Oriented:
     """Reverse as few triangles as a consistent, outward orientation takes."""
-    from patchwright.repair._orient_kernel import walk
+    from patchwright.repair._orient_kernel import volumes, walk
 
     count = len(triangulation)
     if not count:
@@ -54,42 +54,16 @@ def orient(triangulation: Triangulation) -> Oriented:
     turned_area = np.bincount(component, weights=areas * turn, minlength=parts)
     area = np.bincount(component, weights=areas, minlength=parts)
     mixed = (turned_area > 0.0) & (turned_area < area)
-    oriented = np.where(turn[:, None], triangles[:, ::-1], triangles)
     rims = (adjacency.use_count != 2)[adjacency.triangle_edges]
     closed = np.bincount(component, weights=rims.any(axis=1), minlength=parts) == 0
-    volume = _volumes(triangulation.vertices, oriented, component, parts, rims & ~closed[component, None], turn)
+    volume = volumes(triangulation.vertices, triangles, turn, component, parts, rims & ~closed[component, None])
     solid = np.abs(volume) > SOLID * area**1.5
     reverse = np.where(closed | (mixed & solid), volume < 0.0, turned_area > 0.5 * area)
     flipped = turn ^ reverse[component]
+    if not flipped.any():
+        return Oriented(triangulation, flipped, component, one_sided)
     result = np.where(flipped[:, None], triangles[:, ::-1], triangles)
     uv = triangulation.uv
     if uv is not None:
         uv = np.where(flipped[:, None, None], uv[:, ::-1], uv)
     return Oriented(replace(triangulation, triangles=result, uv=uv), flipped, component, one_sided)
-
-
-def _volumes(
-    points: Array, triangles: IntArray, component: IntArray, parts: int, rims: BoolArray, turn: BoolArray
-) -> Array:
-    """(c,) volume of each component with every rim edge joined to the component's rim centre."""
-    corners = points[triangles]
-    weight = np.bincount(component, minlength=parts)
-    centre = np.stack(
-        [np.bincount(component, corners[:, :, k].mean(axis=1), minlength=parts) / weight for k in range(3)], axis=1
-    )
-    local = corners - centre[component, None]
-    six = np.einsum("ij,ij->i", local[:, 0], np.cross(local[:, 1], local[:, 2]))
-    volume = np.bincount(component, weights=six, minlength=parts) / 6.0
-    if not rims.any():
-        return volume
-    # edge k of a reversed triangle (c, b, a) is edge 1 - k of (a, b, c): (a,b) -> 1, (b,c) -> 0, (c,a) -> 2
-    which, edge = np.nonzero(rims)
-    edge = np.where(turn[which], np.array([1, 0, 2])[edge], edge)
-    start, end = triangles[which, edge], triangles[which, (edge + 1) % 3]
-    owner = component[which]
-    rim_count = np.maximum(np.bincount(owner, minlength=parts), 1)
-    middle = np.stack([np.bincount(owner, points[start, k], minlength=parts) / rim_count for k in range(3)], axis=1)
-    apex = (middle - centre)[owner]
-    p, q = points[start] - centre[owner], points[end] - centre[owner]
-    fan = np.einsum("ij,ij->i", apex, np.cross(q, p))
-    return np.asarray(volume + np.bincount(owner, weights=fan, minlength=parts) / 6.0)

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from patchwright.models.arrays import Array, IntArray
+from patchwright.models.arrays import Array, BoolArray, IntArray, frozen
 from patchwright.models.errors import ParameterError
 from patchwright.models.tolerance import Tolerance
 from patchwright.models.triangulation import Triangulation
@@ -74,12 +74,24 @@ class _Pairs:
 class Copies:
     """Free edges of a triangulation that may be copies of each other: found once, for all distances up to one.
 
-    `labels` (n,) are the exact copies of its vertices, `triangles` (m, 3) its triangles over those, `offsets` (n + 1,)
-    and `around` the triangles round each vertex, `pairs` the candidates within `distance`.
+    Only the triangles at the rims matter to a weld; where they are few, all but `labels` and `vertices` is of them.
+
+    Parameters
+    ----------
+    labels : (n,) the exact copies of the triangulation's vertices
+    vertices : (k,) the vertices of the triangles at the rims, None for all
+    points, rim : (k, 3) their places, (k,) whether a free edge ends there
+    triangles, tags : (s, 3) and (s,) or None, the triangles at the rims, over those vertices
+    offsets, around : the triangles round each vertex
+    free, pairs : the free edges, and the candidates among them within `distance`
     """
 
     labels: IntArray
+    vertices: IntArray | None
+    points: Array
+    rim: BoolArray
     triangles: IntArray
+    tags: IntArray | None
     offsets: IntArray
     around: IntArray
     free: FreeEdges
@@ -89,22 +101,35 @@ class Copies:
     @classmethod
     def of(cls, triangulation: Triangulation, distance: float, labels: IntArray | None = None) -> Copies:
         """The candidates within `distance` (0: none); `labels` when it is known already which vertices are one."""
-        points = triangulation.vertices
+        points, tags = triangulation.vertices, triangulation.tags
         labels = exact_labels(points) if labels is None else labels
         triangles = labels[triangulation.triangles]
-        free = free_edges(triangles, triangulation.tags)
+        free = free_edges(triangles, tags)
+        rim = np.zeros(len(points), dtype=np.bool_)
+        rim[free.start] = rim[free.end] = True
+        near: BoolArray = np.asarray(rim[triangles].any(axis=1))
+        vertices = None
+        if 2 * np.count_nonzero(near) < len(near):
+            used = np.zeros(len(points), dtype=np.bool_)
+            used[triangles[near]] = True
+            vertices = np.flatnonzero(used)
+            local = np.cumsum(used) - 1
+            free = replace(free, start=local[free.start], end=local[free.end], apex=local[free.apex])
+            triangles, tags = local[triangles[near]], None if tags is None else tags[near]
+            points, rim = frozen(points[vertices], np.float64), rim[vertices]
         offsets, around = _around(triangles, len(points))
-        return cls(labels, triangles, offsets, around, free, _candidates(points, free, distance), distance)
+        pairs = _candidates(points, free, distance)
+        return cls(labels, vertices, points, rim, triangles, tags, offsets, around, free, pairs, distance)
 
-    def matched(self, points: Array, distance: float) -> tuple[IntArray, Array]:
-        """Match the edges within a distance: each vertex's root (n,), and how far apart the matched pairs are."""
+    def matched(self, distance: float) -> tuple[IntArray, Array]:
+        """Match the edges within a distance: each vertex's root (k,), and how far apart the matched pairs are."""
         from patchwright.repair._near_edges_kernel import trial_order
         from patchwright.repair._weld_kernel import match_edges
 
         pairs, free = self.pairs, self.free
         order = trial_order(pairs.gap, pairs.kind, distance, ORIENTED)
         return match_edges(
-            order, pairs.left, pairs.right, pairs.gap, pairs.kind, free.start, free.end, 1.5 * distance, points,
+            order, pairs.left, pairs.right, pairs.gap, pairs.kind, free.start, free.end, 1.5 * distance, self.points,
             self.triangles, self.offsets, self.around,
         )  # fmt: skip
 
@@ -132,7 +157,7 @@ def weld(triangulation: Triangulation, distance: float, copies: Copies | None = 
     if distance > 0.0 and len(triangulation):
         for turn in range(3):
             known = copies if turn == 0 and copies is not None else Copies.of(triangulation, distance, root)
-            step = _weld_step(known, triangulation, distance)
+            step = _weld_step(known, distance)
             if step is None:
                 break
             root = step[root]
@@ -283,24 +308,32 @@ def _match_gaps(triangulation: Triangulation, distance: float, copies: Copies | 
         copies = Copies.of(triangulation, distance)
     if distance <= 0.0 or not len(copies.free.start):
         return len(copies.free.start), np.zeros(0)
-    return len(copies.free.start), copies.matched(triangulation.vertices, distance)[1]
+    return len(copies.free.start), copies.matched(distance)[1]
 
 
-def _weld_step(copies: Copies, triangulation: Triangulation, distance: float) -> IntArray | None:
+def _weld_step(copies: Copies, distance: float) -> IntArray | None:
     """One round of edge matching, then of the rims' vertices; each vertex's new root, None when nothing merged."""
     from patchwright.repair._weld_kernel import match_points
 
-    points = triangulation.vertices
+    points = copies.points
     if not len(copies.free.start):
         return None
-    step, _ = copies.matched(points, distance)
+    step, _ = copies.matched(distance)
     triangles = step[copies.triangles]
-    free = free_edges(triangles, triangulation.tags)
+    free = free_edges(triangles, copies.tags)
+    true = copies.rim[free.start]  # where only the triangles at the rims are looked at, others end as well
+    free = replace(free, start=free.start[true], end=free.end[true])
     left, right = _point_pairs(points, free, distance)
     if len(left):
         offsets, around = _around(triangles, len(points))
         step = match_points(left, right, 1.5 * distance, points, triangles, offsets, around)[step]
-    return None if np.array_equal(step, np.arange(len(step))) else step
+    if np.array_equal(step, np.arange(len(step))):
+        return None
+    if copies.vertices is None:
+        return step
+    whole = np.arange(len(copies.labels))
+    whole[copies.vertices] = copies.vertices[step]
+    return whole
 
 
 def _point_pairs(points: Array, free: FreeEdges, distance: float) -> tuple[IntArray, IntArray]:
