@@ -3,7 +3,7 @@
 A block of M x N patches is stored as one surface whose knots are simple inside a patch and triple where two patches
 meet: the same points as before, one face in place of M N. Lines across a block along which patches turn by more than
 `JOINT` against each other stay borders of faces, so that no face has a crease inside. Blocks meet at T-junctions: a
-side of a face is one edge per quad along it, and each edge is the network's own curve.
+side of a face has one edge for each stretch along another face, the network's own curves one after another.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ from patchwright.models.nurbs_surface import NurbsSurface
 from patchwright.models.topology import EdgeUse, Topology
 from patchwright.repair.block_cuts import cut_along, cut_apart
 from patchwright.repair.blocks import Blocks
+from patchwright.repair.edge_runs import joined_curve, joined_knots, passed_vertices, polyline, shares
 from patchwright.repair.joins import seam_angles, side_normals
 from patchwright.repair.network import PatchNetwork
-from patchwright.repair.spline_space import DEGREE, knots
+from patchwright.repair.spline_space import DEGREE
 
 JOINT = 0.5  # degrees: patches that turn more against each other are different faces
-_LINE = np.array([0.0, 0.0, 1.0, 1.0])
 # the corners in the order of a loop: which end of u and which end of v; side k runs from corner k to corner k + 1
 _CORNER = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
 
@@ -94,9 +94,9 @@ def _merged(pieces: list[list[Array]]) -> tuple[NurbsSurface, Array, Array]:
     columns = [np.concatenate([net[:, (j > 0) :] for j, net in enumerate(column)], axis=1) for column in pieces]
     whole = np.concatenate([column[(i > 0) :] for i, column in enumerate(columns)], axis=0)
     length = np.array([[_lengths(net) for net in column] for column in pieces])
-    u, v = (_shares(length[:, :, 0].mean(axis=1)), _shares(length[:, :, 1].mean(axis=0)))
-    along_u = _joined_knots(u, [len(column[0]) - DEGREE for column in pieces])
-    along_v = _joined_knots(v, [net.shape[1] - DEGREE for net in pieces[0]])
+    u, v = (shares(length[:, :, 0].mean(axis=1)), shares(length[:, :, 1].mean(axis=0)))
+    along_u = joined_knots(u, [len(column[0]) - DEGREE for column in pieces])
+    along_v = joined_knots(v, [net.shape[1] - DEGREE for net in pieces[0]])
     return NurbsSurface((DEGREE, DEGREE), (along_u, along_v), whole), u, v
 
 
@@ -107,30 +107,15 @@ def _lengths(net: Array) -> tuple[float, float]:
     return float(along_u.mean()), float(along_v.mean())
 
 
-def _shares(lengths: Array) -> Array:
-    """Parameters in [0, 1] that grow with lengths; evenly where there is no length."""
-    total = lengths.sum()
-    steps = lengths / total if total > 0.0 and lengths.min() > 1e-6 * total else np.full(len(lengths), 1 / len(lengths))
-    return np.concatenate([[0.0], np.cumsum(steps)[:-1], [1.0]])
-
-
-def _joined_knots(at: Array, cells: list[int]) -> Array:
-    """Knots of curves of `cells` equal pieces each, one after another between the parameters `at`."""
-    inner = [a + (b - a) * knots(count)[DEGREE + 1 : -1] for a, b, count in zip(at[:-1], at[1:], cells, strict=True)]
-    # each piece ends with three knots at its end; the last end has a fourth, as has the first beginning
-    exact = [np.where(np.arange(len(k)) >= len(k) - DEGREE, b, k) for k, b in zip(inner, at[1:], strict=True)]
-    return np.concatenate([np.zeros(DEGREE + 1), *exact, [1.0]])
-
-
 def _topology(network: PatchNetwork, blocks: Blocks, corners: Array) -> Topology:
-    """The network's edges that are no joints, and the loops of the faces; `corners` (m, 2, 2): u, v at two corners."""
+    """Edges and loops of the faces; `corners` (m, 2, 2): u, v at two opposite corners of each patch in its face.
+
+    Along a loop the network's edges are gathered into runs that end where faces meet or the edge turns. The two runs of
+    one edge go opposite ways; the edge is built from the first.
+    """
     layout = network.layout
     kept = blocks.wall | layout.boundary
-    number = np.cumsum(kept) - 1
-    used = np.zeros(len(layout.vertices), dtype=bool)
-    used[layout.edges[kept]] = True
-    vertex = np.cumsum(used) - 1
-    curves = tuple(network.curve(edge) for edge in np.flatnonzero(kept).tolist())
+    passing = passed_vertices(network, blocks, kept)
     quad, side = np.nonzero(kept[layout.quad_edges])
     turned = (side + blocks.turn[quad]) % 4
     # round each face: side by side, along the first two forwards, along the others backwards
@@ -141,11 +126,26 @@ def _topology(network: PatchNetwork, blocks: Blocks, corners: Array) -> Topology
         np.take_along_axis(corners[quad], _CORNER[(turned + k) % 4][:, None, :], axis=1)[:, 0] for k in (0, 1)
     )
     edge, backward = layout.quad_edges[quad, side], layout.edge_reversed[quad, side]
-    ends = np.where(backward[:, None, None], np.stack([end, start], axis=1), np.stack([start, end], axis=1))
-    uses = [
-        EdgeUse(e, b, NurbsCurve(1, _LINE, line))
-        for e, b, line in zip(number[edge].tolist(), backward.tolist(), ends, strict=True)
-    ]
-    count = np.concatenate([[0], np.cumsum(np.bincount(blocks.block[quad], minlength=len(blocks)))]).tolist()
-    loops = tuple((tuple(uses[a:b]),) for a, b in pairwise(count))
-    return Topology(layout.vertices[used], curves, vertex[layout.edges[kept]], loops)
+    first, last = layout.quads[quad, side], layout.quads[quad, (side + 1) % 4]
+    used = np.zeros(len(layout.vertices), dtype=bool)
+    used[first[~passing[first]]] = True
+    vertex = np.cumsum(used) - 1
+    breaks = [*np.flatnonzero(~passing[first]).tolist(), len(quad)]
+    curves: list[NurbsCurve] = []
+    at: list[Array] = []
+    ends: list[tuple[int, int]] = []
+    number: dict[int, int] = {}
+    loops: list[list[EdgeUse]] = [[] for _ in range(len(blocks))]
+    for a, b in pairwise(breaks):
+        name = int(edge[a:b].min())
+        reverse = name in number
+        if not reverse:
+            number[name] = len(curves)
+            curve, places = joined_curve(network, edge[a:b], backward[a:b])
+            curves.append(curve)
+            at.append(places)
+            ends.append((int(vertex[first[a]]), int(vertex[last[b - 1]])))
+        uv = np.concatenate([start[a:b], end[b - 1 : b]])
+        pcurve = polyline(at[number[name]], uv[::-1] if reverse else uv)
+        loops[blocks.block[quad[a]]].append(EdgeUse(number[name], reverse, pcurve))
+    return Topology(layout.vertices[used], tuple(curves), np.array(ends), tuple((tuple(loop),) for loop in loops))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -87,7 +89,7 @@ def test_a_flat_sheet_is_one_face_with_all_its_area():
     network = network_on(layout)
     made = block_faces(network, find_blocks(layout))
     assert len(made) == 1
-    assert made.topology.use_counts().tolist() == [1] * 16
+    assert made.topology.use_counts().tolist() == [1] * 4  # the sides run through the patches' corners
     assert_faces(network, made)
     assert area(made.surfaces) == pytest.approx(15.0, abs=1e-12)
     # knots follow lengths, so a flat sheet of unit quads is as evenly parametrised as can be
@@ -104,7 +106,8 @@ def test_any_sheet_with_holes_keeps_its_area_and_its_rims(holes, seed):
     made = block_faces(network, find_blocks(layout))
     assert_faces(network, made)
     counts = made.topology.use_counts()
-    assert (counts == 1).sum() == layout.boundary.sum()
+    rim = sum(curve.length() for curve, count in zip(made.topology.curves, counts, strict=True) if count == 1)
+    assert rim == pytest.approx(layout.boundary.sum(), rel=1e-9)  # all edges of the sheet are one long
     assert counts.max(initial=1) <= 2
     assert area(made.surfaces) == pytest.approx(area(network.surfaces()), rel=1e-9)
 
@@ -152,6 +155,27 @@ def test_no_face_has_a_seam_inside_that_is_rougher_than_a_joint():
     angle = seam_angles(layout, side_normals(layout, network.nets))
     assert (angle > JOINT).any()
     assert not (angle[inside] > JOINT).any()
+
+
+def test_an_edge_ends_where_it_turns_where_faces_change_and_where_it_gets_sharp():
+    layout = sheet(4, 1)
+    straight = block_faces(network_on(layout), find_blocks(layout))
+    assert len(straight.topology.curves) == 4
+    bent = layout.vertices.copy()
+    bent[layout.vertices[:, 1] == 0] -= np.array([0.0, 0.1, 0.0]) * (
+        layout.vertices[layout.vertices[:, 1] == 0, :1] == 2
+    )
+    layout = layout_from_quads(bent, layout.quads, lambda a, b: bent[[a, b]])
+    turned = block_faces(network_on(layout), find_blocks(layout))
+    assert len(turned) == 1
+    assert len(turned.topology.curves) == 4 + 3  # at the moved vertex and at both neighbours on its side
+    sharp = sheet(4, 2)
+    middle = (sharp.vertices[sharp.edges][:, :, 1] == 1).all(axis=1)
+    some = middle & (sharp.vertices[sharp.edges][:, :, 0] <= 2).all(axis=1)
+    sharp = replace(sharp, sharp=some)
+    made = block_faces(network_on(sharp), cut_along(sharp, find_blocks(sharp), middle))
+    assert_faces(network_on(sharp), made)
+    assert (made.topology.use_counts() == 2).sum() == 2
 
 
 def test_single_blocks_are_the_patches_themselves():
