@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,6 +12,7 @@ from patchwright.models.cad.capping import FreeLoop, free_loops
 from patchwright.models.cad.seams import edge_uses
 from patchwright.models.surface import Surface
 from patchwright.models.topology import Topology
+from patchwright.repair.deadline import Deadline
 from patchwright.repair.result import Rung
 
 REACH_SHARE = 0.05  # of the diagonal: rims farther apart than this are no seam that came open
@@ -26,29 +26,29 @@ FIT_SHARE = 1e-10  # of the diagonal: how near new edges and pcurves follow what
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """The lengths the rungs decide by, in the model's unit, and when (monotonic seconds) they are to end."""
+    """The lengths the rungs decide by, in the model's unit, and when they are to end."""
 
     diagonal: float
     on: float
     fit: float
     reach: float
     loose: float
-    until: float
+    deadline: Deadline
 
     @classmethod
     def of(cls, diagonal: float, seconds: float = SECONDS) -> Limits:
-        """The shares above of a diagonal; nothing new is begun after `seconds`."""
+        """The shares above of a diagonal; nothing new is begun after `seconds` of processor time."""
         on, fit, reach, loose = (share * diagonal for share in (ON_SHARE, FIT_SHARE, REACH_SHARE, LOOSE_SHARE))
-        return cls(diagonal, on, fit, reach, loose, time.monotonic() + seconds)
+        return cls(diagonal, on, fit, reach, loose, Deadline.after(seconds))
 
     @property
     def expired(self) -> bool:
         """Whether the time is up."""
-        return time.monotonic() > self.until
+        return self.deadline.passed
 
     def left(self, at_most: float) -> float:
         """Seconds left for one call of the kernel, no more than a limit of its own, no fewer than it needs at all."""
-        return max(min(at_most, self.until - time.monotonic()), min(FEWEST, at_most))
+        return self.deadline.left(at_most, FEWEST)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -102,6 +102,7 @@ def _undone(outcome: Outcome, what: str, after: Diagnosis, deadline: Deadline) -
     """What the time did not suffice for, at the place of the gravest defect that is known."""
     worst = after.defects[0] if after.defects else None
     where = point(worst.where if worst is not None else outcome.assembly.bounds.mean(axis=0))
-    reason = f"the time limit of {deadline.limit:.0f} s was reached before it was done: give --time-limit more"
+    limit = f"{deadline.limit:.0f} s of processor time"
+    reason = f"the time limit of {limit} was reached before it was done: give --time-limit more"
     parts = tuple(worst.parts) if worst is not None else ()
     return LedgerEntry(f"{what}: not done in time", Rung.KEEP, parts, reason, count=0, where=where)

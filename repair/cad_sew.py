@@ -15,7 +15,7 @@ from patchwright.models.assembly import Assembly
 from patchwright.models.cad.seams import measure_seams
 from patchwright.models.cad.sewing import free_edge_curve, sew
 from patchwright.models.errors import EngineError
-from patchwright.repair.cad_draft import LOOSE_SHARE, SECONDS, Draft, Limits
+from patchwright.repair.cad_draft import LOOSE_SHARE, Draft, Limits
 from patchwright.repair.cad_heal import heal
 from patchwright.repair.cad_outcome import Outcome
 from patchwright.repair.deadline import Deadline
@@ -26,6 +26,7 @@ SHARES = np.array([1e-8, 1e-7, 1e-6, 1e-5, 1e-4])  # of the diagonal: sewing tol
 COINCIDENT = 1e-6  # of the diagonal: edges this near to each other are one edge that the file holds twice
 SEAM_SHARE = 1e-6  # of the diagonal: the widest seam between kept faces that is closed
 UNCHANGED = 1e-12  # of the diagonal: a kept surface's numbers may differ by round-off only
+HEALING = 0.25  # of the time limit: how long one attempt to heal may take
 WHOLE, WHOLE_PER_FACE = 120.0, 1.0  # seconds for one run of the kernel's sewing, where the deadline leaves so many
 
 
@@ -72,14 +73,14 @@ def healed(model: Assembly, sewn: Outcome, deadline: Deadline, folded: Collectio
     """
     if deadline.passed:
         return replace(sewn, undone=(*sewn.undone, "mending faces and seams"))
-    limits = Limits.of(model.diagonal, deadline.left(SECONDS))
+    limits = Limits.of(model.diagonal, deadline.left(HEALING * deadline.limit))
     found = []
     if sewn.sewn is not None and (free_edges(sewn.assembly) or sewn.sewn.tolerance > COINCIDENT * model.diagonal):
         alone = heal(model, limits, folded)
         if alone is not None and alone.changes:
             found.append(Outcome(alone.assembly, None, sewn.reason, alone))
     if not found or free_edges(found[0].assembly):
-        limits = Limits.of(model.diagonal, deadline.left(SECONDS))
+        limits = Limits.of(model.diagonal, deadline.left(HEALING * deadline.limit))
         made = heal(sewn.assembly, limits, folded)
         found.append(sewn if made is None else replace(sewn, assembly=made.assembly, healed=made))
 
@@ -93,7 +94,9 @@ def _widest_to_be(assembly: Assembly, diagonal: float, deadline: Deadline) -> fl
     gap = max((s.gap for s in measure_seams(assembly)), default=0.0)
     if assembly.topology is None or gap <= SEAM_SHARE * diagonal:
         return gap
-    drawn, _, _ = retrace(Draft(assembly, assembly.topology), Limits.of(diagonal, deadline.left(SECONDS)))
+    drawn, _, _ = retrace(
+        Draft(assembly, assembly.topology), Limits.of(diagonal, deadline.left(HEALING * deadline.limit))
+    )
     return max(
         (s.gap for s in measure_seams(replace(drawn.assembly, topology=drawn.topology, native=None))), default=0.0
     )

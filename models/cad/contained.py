@@ -3,6 +3,9 @@
 One worker per process is kept warm: a fresh interpreter that imports what it is asked for once. Calls travel as pickles
 over its standard streams; whatever native code prints there is dropped. A worker that crashes or overruns its time is
 replaced at the next call. Threads take turns.
+
+Time limits are processor time of the worker, so that a slow or busy machine comes to the same result as a fast one. The
+clock stops only a call that takes `WALL` times as long.
 """
 
 from __future__ import annotations
@@ -24,6 +27,8 @@ from typing import IO, Any
 
 from patchwright.models.errors import EngineError, GeometryError
 
+WALL = 4.0  # times its limit: how long a call may take by the clock
+
 _HEAD = struct.Struct("<Q")
 _START = "from patchwright.models.cad.contained import serve; serve()"
 # exceptions that travel as they are; any other becomes an EngineError of one sentence
@@ -36,7 +41,7 @@ def call(function: Callable[..., Any], *arguments: Any, time_limit: float, what:
     Parameters
     ----------
     function : importable by module and name
-    time_limit : seconds
+    time_limit : seconds of processor time
     what : completes "while ..." in the error's sentence
 
     Raises
@@ -49,6 +54,11 @@ def call(function: Callable[..., Any], *arguments: Any, time_limit: float, what:
 def call_named(name: str, *arguments: Any, time_limit: float, what: str, **options: Any) -> Any:
     """The same for a function given as "module:name", which the caller then need not import."""
     return _call(name, arguments, options, time_limit, what)
+
+
+def spent() -> float:
+    """Seconds of processor time that workers have needed for the calls of this thread."""
+    return getattr(_mine, "spent", 0.0)
 
 
 def stop() -> None:
@@ -82,8 +92,10 @@ def serve() -> None:
 def _answer(request: bytes) -> bytes:
     caught: list[tuple[type[Warning], str]] = []
     outcome: tuple[bool, Any]
+    begun = time.process_time()
     try:
-        name, arguments, options = pickle.loads(request)
+        name, arguments, options, limit = pickle.loads(request)
+        _limited(limit)
         module, _, attribute = name.partition(":")
         function = getattr(importlib.import_module(module), attribute)
         with warnings.catch_warnings(record=True) as record:
@@ -95,10 +107,21 @@ def _answer(request: bytes) -> bytes:
     except Exception as error:  # noqa: BLE001  (native errors have no common base but Exception)
         text = str(error).strip().splitlines()
         outcome = False, EngineError(f"{type(error).__name__}{': ' + text[0] if text else ''}")
+    finally:
+        _limited(0.0)
+    took = time.process_time() - begun
     try:
-        return pickle.dumps((*outcome, caught), pickle.HIGHEST_PROTOCOL)
+        return pickle.dumps((*outcome, caught, took), pickle.HIGHEST_PROTOCOL)
     except Exception as error:  # noqa: BLE001
-        return pickle.dumps((False, EngineError(f"the answer cannot be sent: {error}"), []), pickle.HIGHEST_PROTOCOL)
+        failure = EngineError(f"the answer cannot be sent: {error}")
+        return pickle.dumps((False, failure, [], took), pickle.HIGHEST_PROTOCOL)
+
+
+def _limited(seconds: float) -> None:
+    """End this process once it has used so much more processor time; 0 means never."""
+    if hasattr(signal, "setitimer"):  # elsewhere the clock alone is the limit
+        signal.signal(signal.SIGPROF, signal.SIG_DFL)
+        signal.setitimer(signal.ITIMER_PROF, max(seconds, 0.0))
 
 
 class _Worker:
@@ -149,6 +172,7 @@ def _exactly(stream: IO[bytes], size: int) -> bytes | None:
 
 
 _lock = threading.RLock()
+_mine = threading.local()
 _worker: _Worker | None = None
 
 
@@ -161,7 +185,7 @@ def _drop() -> None:
 
 def _call(name: str, arguments: Any, options: Any, time_limit: float, what: str) -> Any:
     global _worker
-    request = pickle.dumps((name, arguments, options), pickle.HIGHEST_PROTOCOL)
+    request = pickle.dumps((name, arguments, options, time_limit), pickle.HIGHEST_PROTOCOL)
     with _lock:
         if _worker is not None and (_worker.owner != os.getpid() or _worker.process.poll() is not None):
             _drop()
@@ -169,18 +193,20 @@ def _call(name: str, arguments: Any, options: Any, time_limit: float, what: str)
             _worker = _Worker()
         worker, begun = _worker, time.monotonic()
         try:
-            answer = worker.exchange(request, time_limit)
+            answer = worker.exchange(request, WALL * time_limit)
         except BaseException:
             _drop()  # half an answer may be in the pipe
             raise
         if answer is None:
-            took = time.monotonic() - begun
+            late = time.monotonic() - begun >= WALL * time_limit
             code = worker.process.wait()
             _drop()
-            if took >= time_limit:
+            if late or code == -getattr(signal, "SIGPROF", 0):
+                _mine.spent = spent() + time_limit
                 raise EngineError(f"the CAD kernel did not finish within {time_limit:.0f} s while {what}")
             raise EngineError(f"the CAD kernel crashed ({_cause(code)}) while {what}")
-    done, value, caught = _loaded(answer)
+    done, value, caught, took = _loaded(answer)
+    _mine.spent = spent() + took
     for category, text in caught:
         warnings.warn(category(text), stacklevel=4)
     if done:

@@ -68,9 +68,9 @@ def check_here(assembly: Assembly, deviation: Array, seconds: float) -> list[boo
     from patchwright.models.cad import kernel
     from patchwright.models.cad.writing import shape_of
 
-    end = time.monotonic() + seconds
+    end = time.process_time() + seconds
     _, faces = shape_of(assembly, deviation)
     out: list[bool | None] = []
     for face in faces:
-        out.append(None if time.monotonic() > end else bool(kernel.BRepCheck_Analyzer(face).IsValid()))
+        out.append(None if time.process_time() > end else bool(kernel.BRepCheck_Analyzer(face).IsValid()))
     return out

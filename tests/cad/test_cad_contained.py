@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from patchwright.models import EngineError, ParameterError
-from patchwright.models.cad.contained import call, call_named
+from patchwright.models.cad.contained import call, call_named, spent
 
 
 def test_values_errors_and_warnings_come_through() -> None:
@@ -44,6 +44,21 @@ def test_endless_call_ends_at_its_limit() -> None:
         call(time.sleep, 60, time_limit=1.0, what="waiting")
     assert time.monotonic() - begun < 10.0
     assert call(abs, -3, time_limit=30, what="going on") == 3
+
+
+def test_the_limit_is_of_work_and_the_work_is_counted() -> None:
+    call(abs, 1, time_limit=30, what="starting")
+    before = spent()
+    call(time.sleep, 0.6, time_limit=0.5, what="waiting")  # longer by the clock, but hardly any work
+    assert spent() - before < 0.5
+    with pytest.raises(EngineError, match="within 1 s while counting"):
+        call(sum, range(10**11), time_limit=1.0, what="counting")
+    assert spent() - before >= 1.0
+    counted: list[float] = []
+    other = threading.Thread(target=lambda: counted.append(spent()))
+    other.start()
+    other.join()
+    assert counted == [0.0]  # each thread has its own account
 
 
 def test_large_arrays_travel_whole() -> None:

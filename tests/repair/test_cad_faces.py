@@ -18,6 +18,7 @@ from patchwright.models.io import read, write
 from patchwright.repair import repair
 from patchwright.repair.cad_draft import Draft, Limits
 from patchwright.repair.coons_surface import coons_surface
+from patchwright.repair.deadline import Deadline
 from patchwright.repair.height_surface import Frame, Rim, height_surface
 from patchwright.repair.result import Rung, Verdict
 from patchwright.repair.retrace import retrace
@@ -177,6 +178,21 @@ def test_a_bent_opening_is_filled_when_asked_and_planar_ones_by_planes(box, tmp_
     assert (after.topology.use_counts() == 2).all()
     # four sides, two of them arcs: the Coons patch is the cylinder itself
     assert after.triangulation.volume == pytest.approx(ROUNDED_VOLUME, rel=1e-3)
+
+
+def test_a_deadline_counts_work_and_not_waiting():
+    deadline = Deadline.after(0.2)
+    time.sleep(0.3)
+    assert not deadline.passed
+    assert deadline.left(60.0, 0.0) > 0.1
+    end = time.thread_time() + 0.25
+    while time.thread_time() < end:
+        pass
+    assert deadline.passed
+    assert deadline.left(60.0) == 5.0  # what a call that is begun at all is given
+    waited = Deadline.after(0.01)
+    time.sleep(0.05)
+    assert waited.passed  # the clock is an outer stop
 
 
 def test_what_is_not_begun_in_time_is_told_with_its_place(box):
