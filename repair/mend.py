@@ -15,7 +15,6 @@ from typing import Literal
 
 import numpy as np
 
-from patchwright.models.adjacency import Adjacency
 from patchwright.models.arrays import Array, frozen
 from patchwright.models.errors import ParameterError
 from patchwright.models.tolerance import Tolerance
@@ -95,7 +94,7 @@ def _silent(stage: str, share: float) -> None:
 
 def _verify(work: Work) -> None:
     """What is still wrong becomes a problem with its place."""
-    adjacency = Adjacency.of(work.now)
+    adjacency = work.adjacency()
     for kind, wrong, message in (
         ("non-manifold-edge", adjacency.use_count > 2, "edges are used by more than two triangles"),
         ("flipped", adjacency.inconsistent, "edges are run the same way by both triangles"),
@@ -113,7 +112,7 @@ def _verify(work: Work) -> None:
 
 def _result(work: Work, kept: tuple[Array, ...]) -> Mended:
     work.now = work.now.compact()
-    closed = bool(len(work.now)) and bool((Adjacency.of(work.now).use_count == 2).all())
+    closed = bool(len(work.now)) and bool((work.adjacency().use_count == 2).all())
     return Mended(
         work.now,
         frozen(work.origin, np.int64),

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from patchwright.models.adjacency import Adjacency
 from patchwright.models.arrays import BoolArray
 from patchwright.models.triangulation import Triangulation
 from patchwright.repair.clean import split_non_manifold
@@ -30,7 +29,7 @@ def cure(work: Work) -> None:
         if not small.any() or wide.mean() > CURE_SHARE:
             return
         before = work.mark()
-        rims = _free_length(work.now)
+        rims = _free_length(work)
         work.drop("crossing triangles", "they pass through others of their own body", np.flatnonzero(wide))
         opened = np.zeros(len(work.now.vertices), dtype=np.bool_)
         opened[work.now.triangles[wide]] = True
@@ -39,16 +38,16 @@ def cure(work: Work) -> None:
         work.now = orient(split_non_manifold(work.now)).triangulation
         bridge_gaps(work, opened)
         after = _bad(work)
-        if after.sum() < bad.sum() and _free_length(work.now) <= rims * (1.0 + 1e-9):
+        if after.sum() < bad.sum() and _free_length(work) <= rims * (1.0 + 1e-9):
             bad = after
         else:
             work.back(before)
 
 
-def _free_length(triangulation: Triangulation) -> float:
+def _free_length(work: Work) -> float:
     """Length of all free edges."""
-    adjacency = Adjacency.of(triangulation)
-    ends = triangulation.vertices[adjacency.edges[adjacency.free]]
+    adjacency = work.adjacency()
+    ends = work.now.vertices[adjacency.edges[adjacency.free]]
     return float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum())
 
 
@@ -82,7 +81,7 @@ def _small_places(triangulation: Triangulation, some: BoolArray) -> BoolArray:
 
 def _bad(work: Work) -> BoolArray:
     """(m,) triangles at edges used too often or run the same way twice, or crossing others of their component."""
-    adjacency = Adjacency.of(work.now)
+    adjacency = work.adjacency()
     wrong = (adjacency.use_count > 2) | adjacency.inconsistent
     bad = np.asarray(wrong[adjacency.triangle_edges].any(axis=1))
     pairs = work.crossings()

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from patchwright.models.adjacency import Adjacency
 from patchwright.models.arrays import BoolArray
 from patchwright.models.tolerance import Tolerance
 from patchwright.repair.bridge import Border, Bridge, borders_of, bridge, facing_pairs, inner_share
@@ -23,7 +22,7 @@ ROUNDS = 4  # filling one rim may leave another that can be filled now
 def bridge_gaps(work: Work, opened: BoolArray | None = None) -> None:
     """Bridge gaps and holes until no round finds any; rims mostly of the vertices `opened` are holes in any case."""
     for _ in range(ROUNDS):
-        adjacency = Adjacency.of(work.now)
+        adjacency = work.adjacency()
         if not adjacency.free.any():
             return
         borders = borders_of(work.now, adjacency)
@@ -117,7 +116,7 @@ def fill(
 
 def _drop_strays(work: Work) -> None:
     """Open scraps of a few triangles that nothing could be joined to."""
-    adjacency = Adjacency.of(work.now)
+    adjacency = work.adjacency()
     if not adjacency.free.any():
         return
     label = np.asarray(adjacency.components())

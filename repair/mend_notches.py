@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from patchwright.models.adjacency import Adjacency
 from patchwright.models.arrays import IntArray
 from patchwright.repair.bridge import Border, borders_of
 from patchwright.repair.mend_decided import undecided
@@ -24,7 +23,7 @@ def fill_notches(work: Work) -> None:
     """Fill the small notches of the rims that lie in a symmetry plane."""
     planes = work.decisions.surroundings.planes if work.decisions is not None else ()
     for plane in planes:
-        adjacency = Adjacency.of(work.now)
+        adjacency = work.adjacency()
         if not adjacency.free.any():
             return
         notches = [

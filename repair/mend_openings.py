@@ -12,12 +12,12 @@ from patchwright.repair.mended import Work
 
 def unite_as_decided(work: Work, openings: str) -> tuple[Array, ...]:
     """`unite`; of the openings to be closed, those decided upon stay open."""
-    borders = borders_of(work.now) if openings == "close" else ()
+    borders = borders_of(work.now, work.adjacency()) if openings == "close" else ()
     everything = list(range(len(borders)))
     if not borders or len(undecided(work, borders, everything, [], "close")[0]) == len(borders):
         return unite(work, openings)
     unite(work, "keep")
-    borders = borders_of(work.now)
+    borders = borders_of(work.now, work.adjacency())
     singles, _ = undecided(work, borders, list(range(len(borders))), [], "close")
     fill(work, borders, singles, [], "close")
-    return tuple(border.points for border in borders_of(work.now))
+    return tuple(border.points for border in borders_of(work.now, work.adjacency()))

@@ -55,7 +55,7 @@ def _overlaps(work: Work) -> list[_Overlap]:
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
-    adjacency = Adjacency.of(work.now)
+    adjacency = work.adjacency()
     if not adjacency.free.any():
         return []
     rims = classify_rims(work.now, adjacency, work.tolerance)
@@ -178,7 +178,7 @@ def _cut_back(work: Work, overlap: _Overlap) -> None:
     order = np.argsort(step.origin[keep], kind="stable")
     left = np.flatnonzero(keep)[order]
     work.follow(step.triangulation.take(left), step.origin[left], ~whole[left])
-    adjacency = Adjacency.of(work.now)
+    adjacency = work.adjacency()
     rims = classify_rims(work.now, adjacency, work.tolerance)
     fresh = [rim for rim in rims if (rim.loop >= len(body.vertices)).any()]
     if area > allowed or len(fresh) != len(overlap.rims) or any(rim.kind != "gap" for rim in fresh):

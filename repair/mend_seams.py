@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from patchwright.models.adjacency import Adjacency
 from patchwright.repair.clean import drop_collapsed, drop_duplicates, drop_hanging_flats, split_non_manifold
 from patchwright.repair.conform import conform
 from patchwright.repair.mended import Action, Work, middle
@@ -49,7 +48,7 @@ def _below_noise(work: Work, distance: float) -> None:
         work.follow(cleaned.triangulation, cleaned.parents)
         work.now = weld(work.now, distance).triangulation
     _undouble(work)
-    adjacency = Adjacency.of(work.now)
+    adjacency = work.adjacency()
     height = triangle_heights(work.now.vertices, work.now.triangles)
     crowded = adjacency.non_manifold[adjacency.triangle_edges].any(axis=1) & (height < 2.0 * distance)
     if crowded.any():
@@ -76,7 +75,7 @@ def _undouble(work: Work) -> None:
 
 
 def conform_seams(work: Work) -> None:
-    if not Adjacency.of(work.now).free.any():
+    if not work.adjacency().free.any():
         return
     distance = work.tolerance.fit
     first = weld(work.now, distance)

@@ -22,7 +22,7 @@ SHEET = 0.4  # a body whose openings take more of its area than this is an open 
 
 def unite(work: Work, openings: str) -> tuple[Array, ...]:
     """Close what is open for the union, unite, and open the kept openings again."""
-    borders = borders_of(work.now)
+    borders = borders_of(work.now, work.adjacency())
     whole = len(work.now)
     if borders:
         fill(work, borders, list(range(len(borders))), [], "close")
@@ -65,17 +65,17 @@ def unite(work: Work, openings: str) -> tuple[Array, ...]:
     if len(lone):
         _join_sheets(work, *sheets)
     if openings == "close" and len(lone):
-        for border in borders_of(work.now):
+        for border in borders_of(work.now, work.adjacency()):
             message = "an open sheet encloses nothing and cannot be closed"
             work.problems.append(Problem("sheet", border.points.mean(axis=0), border.size, message))
-    return tuple(border.points for border in borders_of(work.now))
+    return tuple(border.points for border in borders_of(work.now, work.adjacency()))
 
 
 def _drop_hollows(work: Work) -> None:
     """Cavities bounded by nothing but auxiliary caps are no part of the model."""
     if not len(work.now):
         return
-    label = np.asarray(Adjacency.of(work.now).components())
+    label = np.asarray(work.adjacency().components())
     real = np.bincount(label, work.origin != BRIDGED) > 0
     left = np.flatnonzero(real[label])
     if 0 < len(left) < len(label):
@@ -111,12 +111,12 @@ def _without_inner_patches(
     work.drop("inner surface", f"it lies inside {names}", real)
     left = np.flatnonzero(~inner)
     work.follow(work.now.take(left), left)
-    borders = borders_of(work.now)
+    borders = borders_of(work.now, work.adjacency())
     fill(work, borders, list(range(len(borders))), [], "cap")
     work.actions = [action for action in work.actions if action.kind != "cap"]
     oriented = orient(split_non_manifold(work.now))
     work.now = oriented.triangulation
-    if Adjacency.of(work.now).free.any():
+    if work.adjacency().free.any():
         work.back(before)
         return is_cap, body
     caps = np.zeros(len(work.now), dtype=np.bool_)
@@ -133,7 +133,7 @@ def _sheets(work: Work, body: IntArray, is_cap: BoolArray, openings: str) -> Boo
     capped = np.bincount(body, is_cap, minlength=parts) > 0
     sheet = capped & (thick <= np.maximum(work.tolerance.gap, 1e-6 * np.sqrt(area)))
     # what could not be closed at all
-    adjacency = Adjacency.of(work.now)
+    adjacency = work.adjacency()
     sheet |= np.bincount(body, adjacency.free[adjacency.triangle_edges].any(axis=1), minlength=parts) > 0
     if openings == "keep":
         sheet |= cap > SHEET * area

@@ -11,7 +11,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from patchwright.models.adjacency import Adjacency
 from patchwright.models.arrays import Array, BoolArray
 from patchwright.models.errors import ParameterError
 from patchwright.models.tree import Tree
@@ -47,7 +46,7 @@ def _beyond(work: Work) -> BoolArray:
 
     Open ones that pass through any other are among them; closed ones that do so can be united.
     """
-    adjacency = Adjacency.of(work.now)
+    adjacency = work.adjacency()
     label = np.asarray(adjacency.components())
     wrong = (adjacency.use_count > 2) | adjacency.inconsistent
     bad, open_ = np.zeros((2, int(label.max(initial=-1)) + 1), dtype=np.bool_)

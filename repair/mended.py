@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from patchwright.models.adjacency import Adjacency
 from patchwright.models.arrays import Array, BoolArray, IntArray
 from patchwright.models.tolerance import Tolerance
 from patchwright.models.triangulation import Triangulation
@@ -120,6 +121,14 @@ class Work:
     decisions: Decisions | None = None  # what stays as it is
     crossed: tuple[Triangulation, IntArray] | None = None  # the last triangulation asked for crossings, and those
     trace: IntArray | None = None  # (m,) the triangle of that one each triangle is, -1 for new ones
+    around: tuple[Triangulation, Adjacency] | None = None  # the last triangulation asked for its adjacency, and that
+
+    def adjacency(self) -> Adjacency:
+        """Of the present state."""
+        if self.around is None or self.around[0] is not self.now:
+            self.around = None  # two at a time would take room
+            self.around = self.now, Adjacency.of(self.now)
+        return self.around[1]
 
     def crossings(self) -> IntArray:
         """(k, 2) pairs of triangles of the present state that pass through each other."""

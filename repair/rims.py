@@ -206,7 +206,7 @@ def _edges_of(triangulation: Triangulation, adjacency: Adjacency, loops: list[In
     owner = which[pick]
     # along the triangle's own winding, whichever way the loop runs
     p, q = points[tail[pick]], points[head[pick]]
-    normal = triangulation.normals[owner]
+    normal = triangulation.take(owner).normals
     along = q - p
     length = np.linalg.norm(along, axis=1)
     outward = np.cross(along, normal)

@@ -188,7 +188,7 @@ def _sides(whole: Triangulation, cut: CutTriangles, deep: IntArray) -> tuple[Int
 
     They are taken when they differ and are the same nearer to the piece.
     """
-    normal = whole.normals[cut.parents[deep]]
+    normal = whole.take(cut.parents[deep]).normals
     middle = cut.vertices[cut.triangles[deep]].mean(axis=1)
     inner = _heights(cut, deep)
     if not len(deep):
@@ -225,7 +225,7 @@ def _winding(whole: Triangulation, tree: Tree, points: Array) -> Array:
     for ray in RAYS:
         direction = np.array(ray) / np.linalg.norm(ray)
         hits = tree.all_hits(points, points + length * direction)
-        way = np.sign(whole.normals[hits.triangle] @ direction)
+        way = np.sign(whole.take(hits.triangle).area_vectors @ direction)
         counts.append(np.bincount(hits.segment, way, minlength=len(points)))
     result = counts[0].astype(np.float64)
     unsure = np.flatnonzero(counts[0] != counts[1])
@@ -242,7 +242,7 @@ def _repeated(whole: Triangulation, found: MeshIntersection, cut: CutTriangles, 
     if not len(found.coplanar):
         return again
     low, high = found.coplanar.min(axis=1), found.coplanar.max(axis=1)
-    same = np.einsum("ij,ij->i", whole.normals[low], whole.normals[high]) > 0.0
+    same = np.einsum("ij,ij->i", whole.take(low).area_vectors, whole.take(high).area_vectors) > 0.0
     low, high = low[same], high[same]
     # every piece of the later triangle against the earlier triangle
     order = np.argsort(cut.parents[deep], kind="stable")

@@ -55,7 +55,7 @@ def find_junctions(exam: Examination) -> IntArray:
     nothing = np.zeros((0, 3), dtype=np.int64)
     if not len(which) or len(which) > MOST_VERTICES:
         return nothing
-    normal = body.normals[which]
+    normal = body.take(which).normals
     along = points[end] - points[start]
     length = np.linalg.norm(along, axis=1)
     outward = np.cross(along, normal)
