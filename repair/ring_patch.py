@@ -1,8 +1,12 @@
 """A new surface through given rings of edges: what replaces a face, or bridges a gap, on exactly those edges.
 
-Candidates, the first that is exact first: the plane of the rings; for one ring with three or four corners the bilinear
-Coons patch of its sides; for any rings the smoothest height over their plane. Among those that hold the edges within
-the tolerance and do not fold, the one that meets the surfaces around at the smallest angle is taken.
+Candidates, the first that is exact first: the plane of the rings; for one ring with three or four corners the Coons
+patch of its sides, which takes the tangent planes of the faces beside it where its edges were smooth; for any rings the
+smoothest height over their plane. Among those that hold the edges within the tolerance and do not fold, the one that
+meets the surfaces around at the smallest angle is taken.
+
+Whether an edge was smooth the edges left around tell: the missing face's tangent plane in a corner holds both sides
+that meet there, so an edge is smooth where the sides at its ends leave it in the tangent plane of the face beside it.
 """
 
 from __future__ import annotations
@@ -17,6 +21,7 @@ from patchwright.models.arrays import Array
 from patchwright.models.errors import GeometryError
 from patchwright.models.knots import divided
 from patchwright.models.nurbs_curve import NurbsCurve
+from patchwright.models.nurbs_surface import NurbsSurface, Side
 from patchwright.models.surface import Surface
 from patchwright.models.topology import EdgeUse, Topology
 from patchwright.repair.cad_draft import Limits
@@ -24,6 +29,7 @@ from patchwright.repair.coons_surface import coons_surface
 from patchwright.repair.height_surface import Frame, Rim, height_surface
 from patchwright.repair.loop_shape import simple
 from patchwright.repair.pcurves import fitted, joined
+from patchwright.repair.tangent_coons import Beside, tangent_coons, worst_angle
 
 RIM = 64  # parts an edge is divided into where a surface is fitted to it
 PROBES = 12  # per span of an edge
@@ -33,7 +39,14 @@ ROOM = 0.01  # of a plane's size: how far its ranges reach beyond its rings
 GRID = 15  # per direction, where a Coons patch is looked at for folds
 BETTER = 1.0  # degrees by which a later candidate must meet the surfaces around better
 
+EVEN = 1e-12  # of a weight: weights that differ by less are equal
+IN = 1e-6  # of a side: how far from its ends it is looked at how the patch leaves it
+MET = 0.05  # degrees: tangent planes this near to each other are one
+SMOOTH = 10.0  # degrees by which a side may leave the tangent plane beside it in a corner of a smooth edge
+AROUND: tuple[Side, ...] = ("v0", "u1", "v1", "u0")  # the sides of a patch as its ring runs
+
 Steps = tuple[tuple[int, bool], ...]  # edges with whether the ring runs along them backwards
+Span = tuple[tuple[int, bool], float, float]  # an edge of a side, and its range in the side's parameter
 Normals = Callable[[int, Array], Array | None]  # unit normals (k, 3) beside an edge at its parameters (k,), or None
 
 
@@ -112,6 +125,7 @@ def _coons(
         surface = coons_surface(curves[0], curves[2].reversed(), curves[3].reversed(), curves[1])
     except GeometryError as error:
         return str(error)
+    surface, smooth = _with_tangents(topology, surface, [spans for _, spans in made], normals, frame)
     if _folds(surface, frame):
         return "the Coons patch of its sides folds"
     starts = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
@@ -124,10 +138,63 @@ def _coons(
                 first, last = last, first
             t0, t1 = topology.curves[edge].domain
             uses.append(EdgeUse(edge, reverse, NurbsCurve(1, np.array([t0, t0, t1, t1]), np.stack([first, last]))))
-    patch = _judged(topology, surface, (tuple(uses),), normals, f"the Coons patch of its {len(sides)} sides")
+    words = f"the Coons patch of its {len(sides)} sides{smooth}"
+    patch = _judged(topology, surface, (tuple(uses),), normals, words)
     if patch.residual > limits.on:
         return f"the Coons patch of its sides misses its edges by {patch.residual:.3g}"
     return patch
+
+
+def _with_tangents(
+    topology: Topology, coons: NurbsSurface, spans: list[list[Span]], normals: Normals, frame: Frame
+) -> tuple[NurbsSurface, str]:
+    """The patch with the tangent planes beside it where its edges were smooth, and words for what it met."""
+    beside = {
+        side: _beside(topology, some, k, normals) for k, (side, some) in enumerate(zip(AROUND, spans, strict=True))
+    }
+    smooth: dict[Side, Beside] = {s: own for s, own in beside.items() if own is not None and _was_smooth(coons, s, own)}
+    before = worst_angle(coons, smooth)
+    if before <= MET:
+        return coons, ""
+    surface, after = tangent_coons(coons, smooth, MET)
+    if after > 0.5 * before or _folds(surface, frame):
+        return coons, ""
+    return surface, f", tangent to {len(smooth)} faces around to {after:.2g} degrees"
+
+
+def _beside(topology: Topology, spans: list[Span], k: int, normals: Normals) -> Beside | None:
+    """Normals along the k-th side of a ring as functions of the patch's own parameter."""
+    if not spans:
+        return None
+
+    def at(t: Array) -> Array:
+        share = 1.0 - t if k > 1 else t  # the ring runs against the patch there
+        out = np.full((len(t), 3), np.nan)
+        for (edge, reverse), a, b in spans:
+            mine = (share >= a) & (share <= b)
+            local = (share[mine] - a) / (b - a)
+            t0, t1 = topology.curves[edge].domain
+            found = normals(edge, t0 + (1.0 - local if reverse else local) * (t1 - t0))
+            if found is not None:
+                out[mine] = found
+        return out
+
+    return at
+
+
+def _was_smooth(coons: NurbsSurface, side: Side, beside: Beside) -> bool:
+    """Whether the sides at both ends of a side leave it in the tangent planes beside it."""
+    k, end = (0 if side[0] == "u" else 1), int(side[1])
+    low, high = coons.domain[1 - k]
+    t = np.array([low, high]) + IN * (high - low) * np.array([1.0, -1.0])  # nothing leaves a pole itself
+    at = np.full(2, coons.domain[k][end])
+    uv = (at, t) if k == 0 else (t, at)
+    across = coons(*uv, (1, 0) if k == 0 else (0, 1))
+    n = beside(t)
+    size = np.linalg.norm(across, axis=1)
+    if not np.isfinite(n).all() or (size <= 0.0).any():
+        return False
+    return bool((np.abs(np.einsum("ij,ij->i", across, n)) <= np.sin(np.radians(SMOOTH)) * size).all())
 
 
 def _height(
@@ -253,12 +320,17 @@ def _angle(a: Array, b: Array) -> float:
 def _side(
     topology: Topology, side: Steps, limits: Limits
 ) -> tuple[NurbsCurve, list[tuple[tuple[int, bool], float, float]]]:
-    """The edges of a side as one polynomial curve on [0, 1] and the part of it each edge is, by share of length."""
+    """The edges of a side as one curve on [0, 1] and the part of it each edge is, by share of length.
+
+    Rational curves stay what they are where their weights are the same at both ends, as those of arcs are.
+    """
     curves, lengths = [], []
     for edge, reverse in side:
         curve = topology.curves[edge].clamped()
-        if curve.rational:
+        if curve.weights is not None and np.ptp(curve.weights[[0, -1]]) > EVEN * curve.weights[0]:
             curve = fitted(curve, curve, limits.fit)
+        elif curve.weights is not None:
+            curve = replace(curve, weights=curve.weights / curve.weights[0])
         curves.append(curve.reversed() if reverse else curve)
         t = np.linspace(*curve.domain, 33)
         lengths.append(float(np.linalg.norm(np.diff(curve(t), axis=0), axis=1).sum()))
@@ -270,8 +342,17 @@ def _side(
         t0, t1 = curve.domain
         piece = curve.elevated(degree - curve.degree) if curve.degree < degree else curve
         knots = np.clip(a + (piece.knots - t0) * ((b - a) / (t1 - t0)), a, b)
-        pieces.append(NurbsCurve(degree, knots, piece.control_points))
-    return joined(pieces), [(s, float(a), float(b)) for s, a, b in zip(side, bounds[:-1], bounds[1:], strict=True)]
+        pieces.append(NurbsCurve(degree, knots, piece.control_points, piece.weights))
+    return _joined(pieces), [(s, float(a), float(b)) for s, a, b in zip(side, bounds[:-1], bounds[1:], strict=True)]
+
+
+def _joined(pieces: list[NurbsCurve]) -> NurbsCurve:
+    """Clamped curves of one degree, weights 1 at their ends, each starting where the last ends, as one."""
+    whole = joined(pieces)
+    if not any(piece.rational for piece in pieces):
+        return whole
+    rows = [np.ones(len(p.control_points)) if p.weights is None else p.weights for p in pieces]
+    return replace(whole, weights=np.concatenate([rows[0], *(row[1:] for row in rows[1:])]))
 
 
 def _between(curve: NurbsCurve, first: Array, last: Array) -> NurbsCurve:
