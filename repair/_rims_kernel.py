@@ -1,4 +1,4 @@
-"""Kernel of the rims: which stretch of which rim each sample of a rim faces."""
+"""Kernels of the rims: which stretch of which rim each sample of a rim faces, boxes of components."""
 # mypy: disable-error-code="untyped-decorator,no-any-return,no-untyped-def,no-untyped-call"
 
 from __future__ import annotations
@@ -195,3 +195,21 @@ def _nearest_other(
                 chord[s] = e
                 place[s] = t
         best[s] = np.sqrt(least)
+
+
+def boxes_of(points: Array, triangles: IntArray, label: IntArray, count: int) -> Array:
+    """(c, 6) lowest and highest corners of the triangles of each label; infinite the other way round without any."""
+    boxes = np.repeat([[np.inf, -np.inf]], count, axis=0).repeat(3, axis=1)
+    _boxes_of(points, triangles, label, boxes)
+    return boxes
+
+
+@filling
+def _boxes_of(points: Array, triangles: IntArray, label: IntArray, boxes: Array) -> None:
+    for t in range(len(triangles)):
+        c = label[t]
+        for k in range(3):
+            for d in range(3):
+                x = points[triangles[t, k], d]
+                boxes[c, d] = min(boxes[c, d], x)
+                boxes[c, d + 3] = max(boxes[c, d + 3], x)

@@ -88,12 +88,19 @@ def drop_hanging_flats(triangulation: Triangulation, height: float) -> Cleaned:
         flat = triangle_heights(current.vertices, current.triangles) <= height
         if not flat.any():
             break
-        adjacency = Adjacency.of(current)
-        sides = adjacency.triangle_edges
-        flat &= adjacency.non_manifold[sides].any(axis=1) | (adjacency.free[sides].sum(axis=1) >= 2)
-        if not flat.any():
+        index = np.flatnonzero(flat)
+        corner = np.zeros(len(current.vertices), dtype=np.bool_)
+        corner[current.triangles[index]] = True
+        # whatever shares an edge with one of them has two of these corners
+        around = np.flatnonzero(np.count_nonzero(corner[current.triangles], axis=1) >= 2)
+        adjacency = Adjacency.of(current.take(around))
+        sides = adjacency.triangle_edges[np.searchsorted(around, index)]
+        hangs = adjacency.non_manifold[sides].any(axis=1) | (adjacency.free[sides].sum(axis=1) >= 2)
+        if not hangs.any():
             break
-        current, parents = current.take(~flat), parents[~flat]
+        left = np.ones(len(current), dtype=np.bool_)
+        left[index[hangs]] = False
+        current, parents = current.take(left), parents[left]
     gone = np.ones(len(triangulation), dtype=np.bool_)
     gone[parents] = False
     return Cleaned(current, parents, np.flatnonzero(gone))

@@ -10,9 +10,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from patchwright.models.adjacency import Adjacency
 from patchwright.models.arrays import IntArray
 from patchwright.models.triangulation import Triangulation
+from patchwright.repair.weld import free_edges
 
 ROOM = 4.0  # times the distance: what is lower is as near to its neighbours as to its copies
 TURNS = np.array([[0, 1, 2], [1, 2, 0], [2, 0, 1], [0, 2, 1], [2, 1, 0], [1, 0, 2]])
@@ -36,7 +36,7 @@ def near_copies(triangulation: Triangulation, distance: float) -> tuple[Triangul
     from patchwright.repair._clean_kernel import triangle_heights
 
     none = np.zeros(0, dtype=np.int64)
-    if not Adjacency.of(triangulation).free.any():
+    if not len(free_edges(triangulation.triangles, None).start):
         return triangulation, none
     corners = triangulation.corners
     able = np.flatnonzero(triangle_heights(triangulation.vertices, triangulation.triangles) > ROOM * distance)

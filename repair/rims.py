@@ -216,9 +216,7 @@ def _edges_of(triangulation: Triangulation, adjacency: Adjacency, loops: list[In
 
 def _diagonals(triangulation: Triangulation, label: IntArray) -> Array:
     """The bounding box's diagonal of each component."""
-    corners = triangulation.corners
-    order = np.argsort(label, kind="stable")
-    starts = np.concatenate([[0], np.cumsum(np.bincount(label))[:-1]])
-    low = np.minimum.reduceat(corners.min(axis=1)[order], starts)
-    high = np.maximum.reduceat(corners.max(axis=1)[order], starts)
-    return np.asarray(np.linalg.norm(high - low, axis=1))
+    from patchwright.repair._rims_kernel import boxes_of
+
+    boxes = boxes_of(triangulation.vertices, triangulation.triangles, label, int(label.max(initial=-1)) + 1)
+    return np.asarray(np.linalg.norm(boxes[:, 3:] - boxes[:, :3], axis=1))

@@ -172,19 +172,20 @@ def faces_of(mesh: Triangulation) -> Pieces:
 
 def _by_part(mesh: Triangulation, pieces: Pieces) -> Pieces:
     """The pieces split where parts meet: a half model may be connected with its symmetry plane and far field."""
-    pairs = np.stack([pieces.label, _tagged(mesh)], axis=1)
-    return _boxed(mesh, np.unique(pairs, axis=0, return_inverse=True)[1].reshape(-1).astype(np.int64))
+    tags = _tagged(mesh)
+    if not len(mesh) or (tags == tags[0]).all():
+        return pieces
+    pairs = pieces.label * (int(tags.max()) + 1) + tags
+    return _boxed(mesh, np.unique(pairs, return_inverse=True)[1].reshape(-1).astype(np.int64))
 
 
 def _boxed(mesh: Triangulation, label: IntArray) -> Pieces:
     if not len(mesh):
         return Pieces(label, np.zeros((0, 3)), np.zeros((0, 3)))
-    order = np.argsort(label, kind="stable")
-    starts = np.concatenate([[0], np.cumsum(np.bincount(label))[:-1]]).astype(np.int64)
-    corners = mesh.corners[order]
-    low = np.minimum.reduceat(corners.min(axis=1), starts)
-    high = np.maximum.reduceat(corners.max(axis=1), starts)
-    return Pieces(label, low, high)
+    from patchwright.repair._rims_kernel import boxes_of
+
+    boxes = boxes_of(mesh.vertices, mesh.triangles, label, int(label.max()) + 1)
+    return Pieces(label, boxes[:, :3].copy(), boxes[:, 3:].copy())
 
 
 def far_pieces(low: Array, high: Array) -> tuple[IntArray, str]:
