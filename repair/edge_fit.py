@@ -21,15 +21,15 @@ from patchwright.repair.edge_curves import (
     with_end_tangents,
     with_tips,
 )
-from patchwright.repair.joins import corner_normals, edge_end_normals, sector_normals, smooth_edges
+from patchwright.repair.joins import edge_end_normals, sector_normals, smooth_edges
 from patchwright.repair.leg_room import leg_room
 from patchwright.repair.patch_fit import Target
 from patchwright.repair.patch_nets import PatchNets
 from patchwright.repair.quad_layout import QuadLayout
 from patchwright.repair.spline_space import collocation, uniform_collocation
-from patchwright.repair.stars import corner_angles, leaving, spread
+from patchwright.repair.stars import leaving, spread
 from patchwright.repair.straight import bent_ends, straighten
-from patchwright.repair.vertex_shapes import vertex_forms, vertex_normals
+from patchwright.repair.vertex_shapes import facing, vertex_forms, vertex_normals
 
 LEAST_LEG = 0.3  # of a leg's length is kept, however far it turned from the direction it owes its vertex
 
@@ -54,10 +54,7 @@ class VertexShapes:
     @classmethod
     def of(cls, layout: QuadLayout, edges: EdgeCurves, nets: PatchNets, target: Target) -> VertexShapes:
         """From a first fit."""
-        normals = corner_normals(nets)
-        # a corner counts by the sine of its angle, by which the error of its normal grows
-        trust = np.abs(np.sin(np.radians(corner_angles(layout, leaving(edges), normals))))
-        sectors = vertex_normals(layout, nets, sector_normals(layout, normals, trust), target)
+        sectors = vertex_normals(layout, nets, sector_normals(layout, facing(nets, target)), target)
         smooth = smooth_edges(layout)
         flat = with_end_tangents(edges, *edge_end_normals(layout, sectors), np.zeros(len(layout.edges), dtype=bool))
         open_ = spread(layout, flat, sectors, smooth)

@@ -7,36 +7,12 @@ import numpy as np
 from patchwright.models.arrays import Array, BoolArray, IntArray
 from patchwright.repair.patch_nets import PatchNets, normals_of
 from patchwright.repair.quad_layout import QuadLayout
-from patchwright.repair.spline_space import collocation, uniform_collocation
+from patchwright.repair.spline_space import uniform_collocation
 
 FIELD_SAMPLES = 33  # parameters at which an edge's normal field is stored
 OUTLIER = 0.0  # cosine: a corner turned from the mean of its sector by more than a right angle is a fold, not a bend
 CUSP = 0.5  # mean cosine between the normals round a vertex and their mean, below which they have no common one
 DAMPING = 0.02  # share of the wanted turn given up where the equations contradict each other
-
-# corner k of a quad as index of u and v
-CORNER_U, CORNER_V = np.array([0, 1, 1, 0]), np.array([0, 0, 1, 1])
-
-
-def corner_normals(nets: PatchNets) -> Array:
-    """(m, 4, 3) unit normal of every patch at its corners, extrapolated from a tenth and a fifth of a cell inside.
-
-    At the corner itself the normal hangs on two edge tangents, which may be nearly parallel at an irregular vertex.
-    """
-    out = np.empty((len(nets), 4, 3))
-    for (m, n), which, group in nets.groups():
-        near, far = (_inner_normals(group, (m, n), share) for share in (0.1, 0.2))
-        out[which] = _unit(2.0 * near - far)
-    return out
-
-
-def _inner_normals(group: Array, cells: tuple[int, int], share: float) -> Array:
-    """(k, 4, 3) unit normals `share` of a cell inside each corner."""
-    m, n = cells
-    us, vs = np.array([share / m, 1 - share / m]), np.array([share / n, 1 - share / n])
-    du = np.einsum("ai,kijd,bj->kabd", collocation(m, us, 1), group, collocation(n, vs), optimize=True)
-    dv = np.einsum("ai,kijd,bj->kabd", collocation(m, us), group, collocation(n, vs, 1), optimize=True)
-    return np.asarray(normals_of(du, dv)[:, CORNER_U, CORNER_V])
 
 
 def sector_labels(layout: QuadLayout) -> IntArray:
@@ -66,29 +42,26 @@ def sector_labels(layout: QuadLayout) -> IntArray:
     return np.asarray(label.reshape(-1, 4), dtype=np.int64)
 
 
-def sector_normals(layout: QuadLayout, at_corners: Array, weights: Array | None = None) -> Array:
+def sector_normals(layout: QuadLayout, at_corners: Array) -> Array:
     """(m, 4, 3) the mean normal of the smooth sector each quad corner belongs to.
 
-    `weights` (m, 4) tell how far each corner's
-    normal is to be trusted. A corner turned from the mean by more than `OUTLIER` has no part in the final mean, unless
-    that leaves none. At a cusp, where the normals are spread over more than a cone of that opening, there is no common
-    normal: zero.
+    A corner turned from the mean by more than `OUTLIER` has no part in the final mean, unless that leaves none. At a
+    cusp, where the normals are spread over more than a cone of that opening, there is no common normal: zero.
     """
     label = sector_labels(layout).reshape(-1)
     count = len(label)
     normals = at_corners.reshape(-1, 3)
-    trust = np.ones(count) if weights is None else weights.reshape(-1)
 
     def mean(share: Array) -> Array:
         total = np.zeros((label.max() + 1, 3))
         np.add.at(total, label, share[:, None] * normals)
         return _unit(total)
 
-    first = mean(trust)
-    second = mean(np.where((first[label] * normals).sum(axis=1) > OUTLIER, trust, 0.0))
+    first = mean(np.ones(count))
+    second = mean(((first[label] * normals).sum(axis=1) > OUTLIER).astype(np.float64))
     second = np.where((second == 0.0).all(axis=1, keepdims=True), first, second)
-    along = np.bincount(label, trust * (first[label] * normals).sum(axis=1))
-    second[along < CUSP * np.bincount(label, trust)] = 0.0
+    along = np.bincount(label, (first[label] * normals).sum(axis=1))
+    second[along < CUSP * np.bincount(label)] = 0.0
     return np.asarray(second[label].reshape(-1, 4, 3))
 
 

@@ -24,13 +24,15 @@ from patchwright.repair.patch_fit import Target, fit_group
 from patchwright.repair.patch_nets import PatchNets, coons_nets, folds, sides
 from patchwright.repair.quad_layout import QuadLayout
 from patchwright.repair.roughness import Roughness
-from patchwright.repair.smooth_joins import join, spoiled
+from patchwright.repair.smooth_joins import join, join_carefully
 
 FIRST_CELLS = 2
 MOST_CELLS = 16
-RELEASES = 3  # times patches that joining would spoil are left as they were fitted
 LEANING = 4.0  # times: a direction in which the error changes so much less than in the other gets no more pieces
 WORTH = 0.8  # twice the pieces must bring the error below this share of what it was, or they count as barren
+MOST_STRAY = (
+    0.35  # of the room beside its path: how far a curve may leave it, less than half for its patches to stay open
+)
 PATIENCE = 2  # barren doublings in a row after which a curve or patch is left as it is
 
 Progress = Callable[[str, float], None]
@@ -83,15 +85,7 @@ def resurface(
 
     def joined(state: _State, *, last: bool = False) -> _State:
         room = np.maximum(state.error, tolerance.fit)
-        nets = join(layout, state.nets, room)
-        if last:
-            fixed = np.zeros(len(nets), dtype=bool)
-            for _ in range(RELEASES):
-                worse = spoiled(nets, state.nets, room) & ~fixed
-                if not worse.any():
-                    break
-                fixed |= worse
-                nets = join(layout, state.nets, room, fixed)
+        nets = (join_carefully if last else join)(layout, state.nets, room)
         error, restless = patch_errors(nets, everything, target, state.invented)
         return _State(nets, error, restless, state.invented)
 

@@ -20,7 +20,7 @@ import numpy as np
 
 from patchwright.models.arrays import Array, BoolArray, IntArray
 from patchwright.repair.fair_fit import inner_points, patch_normal
-from patchwright.repair.joins import edge_uses, smooth_edges
+from patchwright.repair.joins import edge_uses, seam_angles, side_normals, smooth_edges
 from patchwright.repair.patch_nets import PatchNets, evaluate, folds, normals_of
 from patchwright.repair.quad_layout import QuadLayout
 from patchwright.repair.spline_space import collocation, greville
@@ -29,13 +29,14 @@ if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
 
 PASSES = 3  # Gauss-Newton steps
+RELEASES = 4  # times the patches that joining spoils are made stiffer
+CREASE = 90.0  # degrees: a seam that turns more is a fold
 SITES = 3  # Gauss points in each piece of an edge
 ANGLE = 0.5  # degrees left over that count as much as a move by the room a patch has
 LEGS = 0.1  # of a patch's legs: the most room it has, whatever the tolerance
 STRAY = 3.0  # degrees that a step leaves over, beyond which a seam loses its weight
 FOLD = 0.5  # cosine of half the turn beyond which a seam is a fold, which is left
-MOST_ROOMS = 4.0  # a patch that has to move farther is not one its neighbours can be smooth with
-FIXED = 1e9  # stiffness of a patch that stays
+STIFFER = 16.0  # times the stiffness of a patch that joining has spoiled, each time it does
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -80,14 +81,14 @@ def gauss(cells: int, count: int = SITES) -> tuple[Array, Array]:
     return at.reshape(-1), np.tile(0.5 * weights / cells, cells)
 
 
-def join(layout: QuadLayout, fitted: PatchNets, room: Array, fixed: BoolArray | None = None) -> PatchNets:
+def join(layout: QuadLayout, fitted: PatchNets, room: Array, stiffness: Array | None = None) -> PatchNets:
     """The patches with smooth seams.
 
     Parameters
     ----------
     fitted : the patches as fitted, which the result stays near to
     room : (m,) the move of each patch, a length, that is worth `ANGLE`; no more than `LEGS` of its legs
-    fixed : (m,) patches that stay as they were fitted; their neighbours follow them
+    stiffness : (m,) how many times more than others each patch stays as it was fitted; default 1
 
     Seams that cannot be made smooth lose their weight from step to step (Cauchy's), so that they do not bend others.
     """
@@ -98,11 +99,24 @@ def join(layout: QuadLayout, fitted: PatchNets, room: Array, fixed: BoolArray | 
         sizes[which] = len(_ring(cells).i)
     start = np.concatenate([[0], np.cumsum(sizes)])
     room = np.minimum(room, LEGS * _legs(fitted))
-    stays = np.zeros(len(fitted), dtype=bool) if fixed is None else fixed
+    cost = (1.0 if stiffness is None else stiffness) / room**2
     nets = fitted
     for turn in range(PASSES):
-        nets = _step(layout, nets, fitted, start, np.where(stays, FIXED, 1.0) / room**2, robust=turn > 0)
-    return _with(nets, fitted, stays)
+        nets = _step(layout, nets, fitted, start, cost, robust=turn > 0)
+    return nets
+
+
+def join_carefully(layout: QuadLayout, fitted: PatchNets, room: Array) -> PatchNets:
+    """The patches with smooth seams, those that would be spoiled kept stiffer, so that their neighbours follow them."""
+    stiffness = np.ones(len(fitted))
+    nets = join(layout, fitted, room)
+    for _ in range(RELEASES):
+        worse = spoiled(layout, nets, fitted)
+        if not worse.any():
+            break
+        stiffness[worse] *= STIFFER
+        nets = join(layout, fitted, room, stiffness)
+    return nets
 
 
 def _legs(nets: PatchNets) -> Array:
@@ -116,17 +130,11 @@ def _legs(nets: PatchNets) -> Array:
     return out
 
 
-def spoiled(nets: PatchNets, fitted: PatchNets, room: Array) -> BoolArray:
-    """(m,) patches that fold more than they were fitted, or moved farther than `MOST_ROOMS`."""
-    away = np.linalg.norm(nets.controls - fitted.controls, axis=1)
-    moved = np.maximum.reduceat(away, nets.offsets[:-1])
-    return np.asarray((folds(nets) > folds(fitted)) | (moved > MOST_ROOMS * room))
-
-
-def _with(nets: PatchNets, fitted: PatchNets, fixed: BoolArray) -> PatchNets:
-    """`nets` with the marked patches (m,) as they were fitted."""
-    rows = np.repeat(fixed, np.diff(nets.offsets))
-    return PatchNets(nets.cells, nets.offsets, np.where(rows[:, None], fitted.controls, nets.controls))
+def spoiled(layout: QuadLayout, nets: PatchNets, fitted: PatchNets) -> BoolArray:
+    """(m,) patches that fold more than they were fitted, and had no fold along their seams instead."""
+    seams = np.where(smooth_edges(layout), seam_angles(layout, side_normals(layout, fitted)), 0.0)
+    open_ = (seams[layout.quad_edges] < CREASE).all(axis=1)
+    return np.asarray((folds(nets) > folds(fitted)) & open_)
 
 
 def _step(

@@ -19,8 +19,30 @@ from patchwright.repair.spline_space import collocation
 
 STEP = 0.2  # of a side, on a patch of two pieces; less by the root of the pieces where there are more
 REACH = 2  # steps are looked at from each corner
+NEAR = np.array([0.01, 0.02, 0.04, 0.06])  # the same for the target's triangles beside a corner
+MOST_TILT = 0.94  # cosine of 20 degrees: what the data may turn a guess by; beyond, the surface is no height over it
 RIDGE = 1e-6  # of the mean weight: what the points do not tell is zero
 CUBIC_RIDGE = 1e-3  # the same for the cubic terms
+
+
+def facing(nets: PatchNets, target: Target) -> Array:
+    """(m, 4, 3) unit mean normal of the target beside each corner of each patch, zero where it has none.
+
+    The target's triangles nearest to points of the patch are asked. A patch's own normal is worth nothing where its
+    edges leave the corner in one direction or where it folds; these still tell which side is out.
+    """
+    out = np.empty((len(nets), 4, 3))
+    for (cells_u, cells_v), which, group in nets.groups():
+        near_u, near_v = NEAR * np.sqrt(2.0 / cells_u), NEAR * np.sqrt(2.0 / cells_v)
+        for k in range(4):
+            u = 1.0 - near_u if k in (1, 2) else near_u
+            v = 1.0 - near_v if k >= 2 else near_v
+            points = evaluate(group, collocation(cells_u, u), collocation(cells_v, v)).reshape(-1, 3)
+            triangle = target.tree.closest(points).triangle
+            normals = np.asarray(target.tree.triangulation.normals)[triangle]
+            out[which, k] = normals.reshape(len(which), -1, 3).mean(axis=1)
+    length = np.linalg.norm(out, axis=2, keepdims=True)
+    return np.asarray(np.divide(out, length, out=np.zeros_like(out), where=length > 0.0))
 
 
 def vertex_normals(layout: QuadLayout, nets: PatchNets, sectors: Array, target: Target) -> Array:
@@ -29,7 +51,8 @@ def vertex_normals(layout: QuadLayout, nets: PatchNets, sectors: Array, target: 
     Parameters
     ----------
     nets : patches near the data; their points round the vertices, put onto the target, are looked at
-    sectors : (m, 4, 3) first guesses, the same on all corners of a sector (`joins.sector_normals`); zero stays zero
+    sectors : (m, 4, 3) first guesses, the same on all corners of a sector (`joins.sector_normals`); zero stays zero,
+        and a guess that the data would turn by more than 20 degrees stays as it is
     """
     around = _around(nets)
     points = around[:, :, 1:].reshape(-1, 3)
@@ -38,7 +61,7 @@ def vertex_normals(layout: QuadLayout, nets: PatchNets, sectors: Array, target: 
     turned = normal - terms[:, :1] * axes[0] - terms[:, 1:2] * axes[1]
     length = np.linalg.norm(turned, axis=1, keepdims=True)
     turned = np.divide(turned, length, out=np.zeros_like(turned), where=length > 0)
-    turned[(normal == 0.0).all(axis=1)] = 0.0
+    turned = np.where((turned * normal).sum(axis=1, keepdims=True) < MOST_TILT, normal, turned)
     return np.asarray(turned[label].reshape(sectors.shape))
 
 

@@ -26,6 +26,7 @@ class SphereTarget:
         r = np.linalg.norm(points, axis=1, keepdims=True)
         onto = points / r * self.radius
         self.inside_slit = self._mark(onto)
+        self.triangulation = SimpleNamespace(normals=onto / self.radius)
         return SimpleNamespace(points=onto, distance=np.abs(r[:, 0] - self.radius), triangle=np.arange(len(points)))
 
     def all_hits(self, a, b):

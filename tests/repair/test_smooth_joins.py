@@ -8,7 +8,7 @@ from quad_shapes import Marks, SphereTarget, layout_from_quads, sphere_layout
 
 from patchwright.models.tolerance import Tolerance
 from patchwright.repair.fair_fit import curve_fit, jumps
-from patchwright.repair.joins import corner_normals, regular_edges, seam_angles, sector_normals, side_normals
+from patchwright.repair.joins import regular_edges, seam_angles, sector_normals, side_normals
 from patchwright.repair.patch_fit import Target
 from patchwright.repair.patch_nets import PatchNets
 from patchwright.repair.resurface import resurface
@@ -17,7 +17,7 @@ from patchwright.repair.smooth_joins import join, spoiled
 from patchwright.repair.spline_space import greville, uniform_collocation
 from patchwright.repair.stars import leaving
 from patchwright.repair.straight import opposite_ends, straighten
-from patchwright.repair.vertex_shapes import vertex_forms, vertex_normals
+from patchwright.repair.vertex_shapes import facing, vertex_forms, vertex_normals
 
 
 @pytest.fixture(scope="module")
@@ -89,25 +89,76 @@ def test_a_disturbed_network_is_made_smooth_and_its_boundaries_stay(ball):
     before, after = (seam_angles(layout, side_normals(layout, n)) for n in (rough, smooth))
     assert np.median(before) > 1.0
     assert after.max() < 0.1 * np.median(before)
-    assert not spoiled(smooth, rough, room).any()
+    assert not spoiled(layout, smooth, rough).any()
     for (_, _, old), (_, _, new) in zip(rough.groups(), smooth.groups(), strict=True):
         assert (old[:, [0, -1]] == new[:, [0, -1]]).all()
         assert (old[:, :, [0, -1]] == new[:, :, [0, -1]]).all()
 
 
-def test_fixed_patches_stay_and_their_neighbours_follow(ball):
+def changed(nets, patch, change):
+    """Nets with the net (M, N, 3) of one patch changed."""
+    controls = np.array(nets.controls)
+    rows = slice(nets.offsets[patch], nets.offsets[patch + 1])
+    controls[rows] = change(nets.nets(np.array([patch]))[0].copy()).reshape(-1, 3)
+    return PatchNets(nets.cells, nets.offsets, controls)
+
+
+def bulge(net):
+    net[1:-1, 1:-1] *= 1.001
+    return net
+
+
+def backwards(net):
+    net[1:-1, 1:-1] = net[-2:0:-1, 1:-1]
+    return net
+
+
+def test_stiff_patches_stay_and_their_neighbours_follow(ball):
     layout, network, _ = ball
-    fixed = np.arange(len(network)) == 7
-    again = join(layout, network.nets, np.full(len(network), 1e-3), fixed)
-    assert (again.nets(np.array([7])) == network.nets.nets(np.array([7]))).all()
-    assert seam_angles(layout, side_normals(layout, again)).max() < 0.1
+    bulged = changed(network.nets, 7, bulge)
+    rows = slice(bulged.offsets[7], bulged.offsets[8])
+    moved = []
+    for stiffness in (1.0, 1e3, 1e6):
+        again = join(layout, bulged, np.full(len(bulged), 1e-3), np.where(np.arange(len(bulged)) == 7, stiffness, 1.0))
+        moved.append(np.abs(again.controls[rows] - bulged.controls[rows]).max())
+    assert moved[0] > 10.0 * moved[1] > 100.0 * moved[2] > 0.0
+    before, after = (seam_angles(layout, side_normals(layout, nets)).max() for nets in (bulged, again))
+    assert after < 0.2 * before
+
+
+def test_only_a_patch_that_had_no_folded_seam_is_spoiled_by_a_fold(ball):
+    layout, network, _ = ball
+    folded = changed(network.nets, 7, backwards)
+    assert spoiled(layout, folded, network.nets).nonzero()[0].tolist() == [7]
+    inside_out = changed(network.nets, 7, lambda net: 2.0 * net[[0, -1]].mean(axis=0) - net)
+    assert seam_angles(layout, side_normals(layout, inside_out)).max() > 90.0
+    assert not spoiled(layout, folded, inside_out).any()
 
 
 def test_regular_edges_keep_away_from_the_eight_corners_of_the_cube(ball):
-    layout, network, _ = ball
+    layout, _, _ = ball
     count = np.bincount(layout.edges.reshape(-1))
     assert (regular_edges(layout) == (count[layout.edges] == 4).all(axis=1)).all()
-    assert sector_normals(layout, corner_normals(network.nets)).shape == (len(network), 4, 3)
+
+
+def test_the_target_tells_normals_where_patches_fold(ball):
+    layout, network, target = ball
+    out = layout.vertices[layout.quads]
+    for nets in (network.nets, changed(network.nets, 7, backwards)):
+        found = facing(nets, Target(target, Marks(target)))
+        assert np.degrees(np.linalg.norm(found - out, axis=-1).max()) < 3.0
+        assert np.degrees(np.linalg.norm(sector_normals(layout, found) - out, axis=-1).max()) < 3.0
+
+
+def test_a_guess_far_off_is_not_turned(ball):
+    layout, network, target = ball
+    out = layout.vertices[layout.quads]
+    guess = out + 0.7 * np.cross(out, (0.3, 0.5, 0.8))
+    guess /= np.linalg.norm(guess, axis=-1, keepdims=True)
+    off = np.degrees(np.arccos((guess * out).sum(axis=-1)))
+    normals = vertex_normals(layout, network.nets, guess, Target(target, Marks(target)))
+    assert np.array_equal(normals[off > 25.0], guess[off > 25.0])
+    assert (off > 25.0).any()
 
 
 @pytest.mark.parametrize("radius", [0.5, 4.0])
