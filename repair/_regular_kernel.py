@@ -288,6 +288,9 @@ def renew(m, g, net, d, s, row, k, least, stretch, relative):
     rows, new_v = fill(border, d.corner, k, row, s.local)
     if new_q + rows > len(net.quads) or next_v + new_v - border > len(net.at) or 2 * rows > 3 * d.size[0] + 16:
         return False
+    for i in range(d.size[1]):
+        if d.border[i] < 0 and m.kind[d.vertices[i]] == 2:  # a tip stays a vertex
+            return False
     region = net.region[d.quads[0]]
     for i in range(border):
         s.vertex[i] = d.vertices[d.loop[i]]

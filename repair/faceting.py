@@ -10,6 +10,7 @@ import numpy as np
 from patchwright.models.adjacency import Adjacency
 from patchwright.models.arrays import Array
 from patchwright.models.triangulation import Triangulation
+from patchwright.repair.tips import find_tips
 
 SHARE = 99.0  # per cent of the area whose facets are within the stated distance
 
@@ -19,7 +20,7 @@ def facet_heights(body: Triangulation, angle: float) -> Array:
 
     The smooth surface is the quadratic one with the corners' mean normals: over the middle of an edge it rises by
     (p_j - p_i) . (n_i - n_j) / 8 (exact for a circle to second order), over the centroid by 4/9 of the edges' sum.
-    Edges sharper than `angle` degrees part the normals on either side.
+    Edges sharper than `angle` degrees part the normals on either side; at a tip every triangle keeps its own.
     """
     normals = _corner_normals(body, angle)
     corners = body.corners
@@ -48,6 +49,8 @@ def _corner_normals(body: Triangulation, angle: float) -> Array:
     triangle, side = np.nonzero(adjacency.neighbours >= 0)
     other = adjacency.neighbours[triangle, side]
     smooth = np.einsum("ij,ij->i", normal[triangle], normal[other]) > np.cos(np.radians(angle))
+    creased = np.zeros(len(body.vertices), dtype=bool)
+    creased[body.triangles[triangle[~smooth], side[~smooth]]] = True
     triangle, side, other = triangle[smooth], side[smooth], other[smooth]
     links = []
     for corner in (side, (side + 1) % 3):
@@ -61,4 +64,6 @@ def _corner_normals(body: Triangulation, angle: float) -> Array:
     np.add.at(total, label, np.repeat(body.area_vectors, 3, axis=0))
     length = np.linalg.norm(total, axis=1, keepdims=True)
     total = np.divide(total, length, out=np.zeros_like(total), where=length > 0)
-    return np.asarray(total[label].reshape(-1, 3, 3))
+    normals = total[label].reshape(-1, 3, 3)
+    tip = find_tips(body, normal, creased, angle)[body.triangles]
+    return np.asarray(np.where(tip[..., None], normal[:, None], normals))

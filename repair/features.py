@@ -24,6 +24,7 @@ from patchwright.repair.feature_cleaning import (
     not_slits,
     not_specks,
 )
+from patchwright.repair.tips import find_tips
 
 HYSTERESIS = 0.6  # of the angle: how far a sharp line may fade
 SLIT = 1e-3  # of the diagonal, a quarter of the smallest quad: lines between the same ends that are nearer are one
@@ -50,7 +51,7 @@ class Features:
     beside : (k, 2) triangles beside the segment that starts here, the second -1 at a boundary; the last row is as the
         one before
     kind : (c,) FOLLOWED, SHARP or BOUNDARY
-    corners : (f,) vertices in which curves end
+    corners : (f,) vertices in which curves end, and tips, which stand alone
     noise : estimated scatter of the vertices off a smooth surface, a length
     """
 
@@ -128,7 +129,10 @@ def find_features(triangulation: Triangulation, *, angle: float = 30.0, frozen: 
     if merge_specks(body, neighbours, normals, sides, sharp, firm, length, least, np.cos(np.radians(angle))):
         sharp &= not_specks(edges, sharp | firm, firm, length, body.diagonal)
     kind = np.where(free, BOUNDARY, np.where(sharp, SHARP, np.where(follow, FOLLOWED, 0)))
-    return _chains(body, neighbours, normals, noise, edges, sides, kind, first, second, width)
+    on_curve = np.zeros(len(points), dtype=bool)
+    on_curve[edges[kind > 0]] = True
+    tips = find_tips(body, normals, on_curve, angle)
+    return _chains(body, neighbours, normals, noise, edges, sides, kind, first, second, width, tips)
 
 
 def _chains(
@@ -142,6 +146,7 @@ def _chains(
     first: IntArray,
     second: IntArray,
     width: float,
+    tips: BoolArray,
 ) -> Features:
     """Curves through the feature edges (`kind` > 0), broken at branches, changes of kind and sharp turns."""
     from patchwright.repair import _feature_kernel as kernel
@@ -173,7 +178,7 @@ def _chains(
     if len(loose):
         kept = kind.copy()
         kept[picked[walked[loose - owner[loose]]]] = 0
-        return _chains(body, neighbours, normals, noise, edges, sides, kept, first, second, width)
+        return _chains(body, neighbours, normals, noise, edges, sides, kept, first, second, width, tips)
     # no corner right beside another end
     apart = (along > np.where(stop[begin], width, -1.0)) & (length - along > np.where(stop[finish], width, -1.0))
     stop[vertices[turns & apart]] = True
@@ -208,7 +213,7 @@ def _chains(
         along,
         np.ascontiguousarray(np.stack([left[edge], right[edge]], axis=1)),
         kind[picked[walked[starts[:-1]]]],
-        np.flatnonzero(stop),
+        np.flatnonzero(stop | (tips & (degree == 0))),
         noise,
     )
 

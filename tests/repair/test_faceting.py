@@ -48,3 +48,16 @@ def test_creases_are_only_creases_beyond_the_angle():
 
 def test_nothing_has_no_height():
     assert faceting(Triangulation(np.zeros((0, 3)), np.zeros((0, 3), dtype=int)), 30.0) == 0.0
+
+
+@pytest.mark.parametrize("sides", [24, 48, 96])
+def test_the_apex_of_a_cone_is_no_height(sides):
+    angle, height = 2 * np.pi * np.arange(sides) / sides, 3.0
+    ring = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(sides)])
+    a = np.arange(sides)
+    cone = Triangulation(
+        np.concatenate([ring, [[0.0, 0.0, height]]]), np.column_stack([a, (a + 1) % sides, 0 * a + sides])
+    )
+    # the rim's sagitta, seen along the cone's normal
+    sagitta = (1.0 - np.cos(np.pi / sides)) * height / np.hypot(1.0, height)
+    assert faceting(cone, 30.0) == pytest.approx(sagitta, rel=0.05)

@@ -1,0 +1,34 @@
+"""Tips: points of a triangulation that stand alone, such as the apex of a cone, where no tangent plane is."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from patchwright.models.arrays import Array, BoolArray
+from patchwright.models.triangulation import Triangulation
+
+
+def find_tips(body: Triangulation, normals: Array, on_curve: BoolArray, angle: float) -> BoolArray:
+    """(n,) vertices off all curves round which no triangle faces the way their mean normal does.
+
+    Parameters
+    ----------
+    body : a 2-manifold
+    normals : (m, 3) unit normals freed from noise
+    on_curve : (n,) vertices on feature curves
+    angle : degrees; as much does every triangle round a tip lean away from the mean
+
+    The triangles count by their angles at the vertex. On a cone all lean by the complement of its half angle, so a cone
+    blunter than the complement of `angle` has no tip.
+    """
+    flat = body.triangles.reshape(-1)
+    ahead = np.roll(body.corners, -1, axis=1) - body.corners
+    back = np.roll(body.corners, 1, axis=1) - body.corners
+    opening = np.arctan2(np.linalg.norm(np.cross(ahead, back), axis=2), (ahead * back).sum(axis=2)).reshape(-1)
+    mean = np.zeros((len(body.vertices), 3))
+    np.add.at(mean, flat, np.repeat(normals, 3, axis=0) * opening[:, None])
+    size = np.linalg.norm(mean, axis=1, keepdims=True)
+    mean = np.divide(mean, size, out=np.zeros_like(mean), where=size > 0)
+    most = np.full(len(mean), -1.0)
+    np.maximum.at(most, flat, np.einsum("ij,ij->i", np.repeat(normals, 3, axis=0), mean[flat]))
+    return np.asarray((most < np.cos(np.radians(angle))) & ~on_curve & (size[:, 0] > 0.0))

@@ -1,0 +1,76 @@
+"""Tips: the apex of a cone, at any size and place, and nothing on smooth, sharp or noisy surfaces."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from patchwright.models import Triangulation
+from patchwright.models.samples import cube, sphere
+from patchwright.repair.features import find_features
+from patchwright.repair.quad_layout import quad_layout
+from patchwright.repair.tips import find_tips
+
+
+def cone(sides=48, height=2.0, rings=1):
+    """A closed cone with its apex as vertex 0 and a fan for its base."""
+    angle = 2 * np.pi * np.arange(sides) / sides
+    rim = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    levels = np.arange(1, rings + 1) / rings
+    points = [np.array([[0.0, 0.0, height]])]
+    points += [np.column_stack([s * rim, np.full(sides, height * (1.0 - s))]) for s in levels]
+    points.append(np.zeros((1, 3)))
+    a = np.arange(sides)
+    b = (a + 1) % sides
+    triangles = [np.column_stack([0 * a, 1 + a, 1 + b])]
+    for k in range(rings - 1):
+        low, high = 1 + k * sides, 1 + (k + 1) * sides
+        triangles += [np.column_stack([low + a, high + a, high + b]), np.column_stack([low + a, high + b, low + b])]
+    last = 1 + (rings - 1) * sides
+    triangles.append(np.column_stack([last + a, 0 * a + len(np.concatenate(points)) - 1, last + b]))
+    return Triangulation(np.concatenate(points), np.concatenate(triangles))
+
+
+def tips_of(body):
+    return find_features(body).corners.tolist()
+
+
+@pytest.mark.parametrize("height", [0.7, 2.0, 9.0])
+@pytest.mark.parametrize("rings", [1, 8])
+def test_the_apex_of_a_cone_is_a_tip(height, rings):
+    body = cone(height=height, rings=rings)
+    corners = tips_of(body)
+    assert 0 in corners
+    assert len(corners) == 2  # and where the rim's curve begins
+
+
+def test_a_blunt_cone_has_none():
+    assert 0 not in tips_of(cone(height=0.5))  # its normals lean 26.6 degrees away from the axis
+
+
+def test_tips_move_with_the_body():
+    body = cone(rings=6)
+    turn, _ = np.linalg.qr(np.random.default_rng(4).standard_normal((3, 3)))
+    turn *= np.sign(np.linalg.det(turn))
+    moved = Triangulation(1e3 * body.vertices @ turn.T + 1e4, body.triangles)
+    assert 0 in tips_of(moved)
+
+
+def test_smooth_and_sharp_bodies_have_none():
+    for body in (sphere().assembly.triangulation, cube().assembly.triangulation):
+        normals = body.normals
+        assert not find_tips(body, normals, np.zeros(len(body.vertices), dtype=bool), 60.0).any()
+    body = sphere().assembly.triangulation
+    rng = np.random.default_rng(0)
+    noisy = Triangulation(body.vertices + 1e-3 * rng.standard_normal(body.vertices.shape), body.triangles)
+    assert not tips_of(noisy)
+
+
+@pytest.mark.parametrize("rings", [1, 10])
+def test_the_layout_of_a_cone_keeps_its_apex(rings):
+    body = cone(height=3.0, rings=rings)
+    layout = quad_layout(body)
+    assert (layout.vertices == body.vertices[0]).all(axis=1).any()
+    assert layout.report.folded == 0
+    assert layout.report.min_scaled_jacobian > 0.2
+    assert len(layout) < 300
