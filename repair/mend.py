@@ -70,6 +70,8 @@ def mend(
     for at, (name, stage) in enumerate(stages):
         tell(name, 0.08 * at)
         stage(work)
+        if work.problems:  # the data cannot be mended within the tolerance
+            return _result(work, ())
     tell("bridge", 0.4)
     bridge_gaps(work)
     fill_notches(work)

@@ -6,10 +6,21 @@ import numpy as np
 
 from patchwright.repair.clean import drop_collapsed, drop_duplicates, drop_hanging_flats, split_non_manifold
 from patchwright.repair.conform import conform
-from patchwright.repair.mended import Action, Work, middle
+from patchwright.repair.mended import Action, Problem, Work, middle
 from patchwright.repair.near_copies import near_copies
 from patchwright.repair.orient import orient
-from patchwright.repair.weld import Copies, contract_short, reach_of, weld, weld_distance
+from patchwright.repair.weld import (
+    WIDE_SPREAD,
+    Copies,
+    contract_short,
+    reach_of,
+    scatter_beyond,
+    torn,
+    weld,
+    weld_distance,
+)
+
+SHATTERED = 0.5  # of the triangles alone: there is no surface whose gaps could be bridged
 
 
 def weld_copies(work: Work) -> None:
@@ -19,6 +30,12 @@ def weld_copies(work: Work) -> None:
     if len(doubled):
         copies = Copies.of(work.now, reach_of(work.tolerance))
     welded = weld(work.now, distance, copies)
+    apart = distance
+    if torn(copies, welded.triangulation, distance, work.tolerance):
+        apart = WIDE_SPREAD * distance
+        if apart <= 2.0 * work.tolerance.fit:
+            welded = weld(work.now, distance, copies, WIDE_SPREAD)
+    failed = apart > distance and torn(copies, welded.triangulation, distance, work.tolerance)
     del copies
     work.noise, work.distance = welded.noise, distance
     work.now = welded.triangulation
@@ -30,8 +47,32 @@ def weld_copies(work: Work) -> None:
             )
         )  # fmt: skip
 
-    if distance > work.tolerance.gap:
+    if failed:
+        _tell_scatter(work, apart)
+    elif distance > work.tolerance.gap:
         _below_noise(work, distance)
+    else:
+        adjacency = work.adjacency()
+        alone = int(np.count_nonzero(adjacency.free[adjacency.triangle_edges].all(axis=1)))
+        beyond = scatter_beyond(work.now, work.tolerance) if alone >= SHATTERED * len(work.now) else None
+        if beyond is not None:
+            _tell_scatter(work, beyond)
+
+
+def _tell_scatter(work: Work, distance: float) -> None:
+    """A surface in pieces, because copies of points lie farther apart than the tolerance allows, is not mended."""
+    digits = 10.0 ** (np.floor(np.log10(distance)) - 1.0)
+    enough = float(np.ceil(0.52 * distance / digits) * digits)
+    work.problems.append(
+        Problem(
+            "scatter",
+            middle(work.now),
+            work.now.diagonal,
+            f"the surface is in pieces of a few triangles: the copies of a point lie up to {distance:.3g} apart, and "
+            f"welding them would move corners farther than the fit tolerance {work.tolerance.fit:.3g}; a tolerance of "
+            f"{enough:.3g} allows it",
+        )
+    )
 
 
 def _below_noise(work: Work, distance: float) -> None:

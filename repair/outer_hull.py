@@ -108,6 +108,8 @@ def _cut(triangulation: Triangulation, bodies: list[IntArray], group: IntArray, 
     some = triangulation.take(own)
     rows = np.where(turned[:, None], some.triangles[:, ::-1], some.triangles)
     hull, parent = outer_pieces(replace(some, triangles=rows, uv=None))
+    if not len(hull):
+        raise GeometryError("nothing of them bounds anything from outside")
     return hull.vertices, hull.triangles, own[parent]
 
 
@@ -139,7 +141,6 @@ def _joined(
     failed: tuple[str, ...],
 ) -> Hull:
     """The pieces made of some groups of bodies beside the bodies of the others as they came."""
-    count = len(triangulation)
     vertices = [triangulation.vertices]
     base = len(triangulation.vertices)
     rows: list[IntArray] = []
@@ -172,7 +173,6 @@ def _joined(
         tags=None if triangulation.tags is None else triangulation.tags[parent],
     )
     cut = np.concatenate(cuts)[order] if cuts else np.zeros(0, dtype=np.bool_)
-    assert count == 0 or len(result)
     return Hull(result, parent, cut, tuple(inside), failed)
 
 

@@ -20,8 +20,11 @@ from patchwright.models.triangulation import Triangulation
 
 REACH_SHARE = 0.5  # of an edge's length: copies of a point are nearer to each other than to the edge's other end
 ORIENTED = 0.2  # below this share of candidates that run the same way the triangles came oriented: they are chance
+SPREAD = 1.5  # times the weld distance: the farthest copies of one point
+WIDE_SPREAD = 2.2  # the same where they stand round their point in a ring, as the corners of a hexagon
 PLATEAU = 3.0  # a tolerance this many times larger must find next to nothing more
 PLATEAU_GAIN = 0.01  # "next to nothing": this share of what was found
+WIDEST = 64.0  # times the fit tolerance: how far scatter is looked for
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -121,15 +124,18 @@ class Copies:
         pairs = _candidates(points, free, distance)
         return cls(labels, vertices, points, rim, triangles, tags, offsets, around, free, pairs, distance)
 
-    def matched(self, distance: float) -> tuple[IntArray, Array]:
-        """Match the edges within a distance: each vertex's root (k,), and how far apart the matched pairs are."""
+    def matched(self, distance: float, spread: float = SPREAD) -> tuple[IntArray, Array]:
+        """Match the edges within a distance: each vertex's root (k,), and how far apart the matched pairs are.
+
+        `spread` times the distance is the most that the copies of a point may be apart.
+        """
         from patchwright.repair._near_edges_kernel import trial_order
         from patchwright.repair._weld_kernel import match_edges
 
         pairs, free = self.pairs, self.free
         order = trial_order(pairs.gap, pairs.kind, distance, ORIENTED)
         return match_edges(
-            order, pairs.left, pairs.right, pairs.gap, pairs.kind, free.start, free.end, 1.5 * distance, self.points,
+            order, pairs.left, pairs.right, pairs.gap, pairs.kind, free.start, free.end, spread * distance, self.points,
             self.triangles, self.offsets, self.around,
         )  # fmt: skip
 
@@ -139,10 +145,13 @@ def reach_of(tolerance: Tolerance) -> float:
     return PLATEAU * max(2.0 * tolerance.fit, tolerance.gap)
 
 
-def weld(triangulation: Triangulation, distance: float, copies: Copies | None = None) -> Welded:
+def weld(triangulation: Triangulation, distance: float, copies: Copies | None = None, spread: float = SPREAD) -> Welded:
     """Merge the copies of a point that lie within `distance` of each other (0: only equal ones).
 
-    `copies` : of the same triangulation, when they are at hand.
+    Parameters
+    ----------
+    copies : of the same triangulation, when they are at hand
+    spread : times the distance: no copies of one point are farther apart
 
     Raises
     ------
@@ -157,7 +166,7 @@ def weld(triangulation: Triangulation, distance: float, copies: Copies | None = 
     if distance > 0.0 and len(triangulation):
         for turn in range(3):
             known = copies if turn == 0 and copies is not None else Copies.of(triangulation, distance, root)
-            step = _weld_step(known, distance)
+            step = _weld_step(known, distance, spread)
             if step is None:
                 break
             root = step[root]
@@ -229,6 +238,32 @@ def weld_distance(
         f"the number of free edges falls from {free} to {left} at {distance:.3g}"
         f" and stays up to {PLATEAU * distance:.3g}"
     )
+
+
+def torn(copies: Copies, welded: Triangulation, distance: float, tolerance: Tolerance) -> bool:
+    """Whether a weld joined less than half of the edges that lie within the distance: the copies spread too far."""
+    free = len(copies.free.start)
+    left = len(free_edges(welded.triangles, None).start)
+    if 4 * left <= free:
+        return False
+    return free - left < int(np.count_nonzero(copies.matched(reach_of(tolerance))[1] <= distance))
+
+
+def scatter_beyond(triangulation: Triangulation, tolerance: Tolerance) -> float | None:
+    """How far apart the data shows the copies of a point to be, where that is more than the fit tolerance allows.
+
+    None where it is not, or where nothing shows up to `WIDEST` times as much: what is apart then are no copies.
+    """
+    factor = 1.0
+    while factor < WIDEST:
+        factor *= 4.0
+        wide = replace(tolerance, fit=factor * tolerance.fit)
+        copies = Copies.of(triangulation, reach_of(wide))
+        distance, _ = weld_distance(triangulation, wide, copies)
+        if distance > 2.0 * tolerance.fit:
+            welded = weld(triangulation, distance, copies).triangulation
+            return WIDE_SPREAD * distance if torn(copies, welded, distance, wide) else distance
+    return None
 
 
 def _merge(triangulation: Triangulation, first: IntArray, root: IntArray) -> Welded:
@@ -311,14 +346,14 @@ def _match_gaps(triangulation: Triangulation, distance: float, copies: Copies | 
     return len(copies.free.start), copies.matched(distance)[1]
 
 
-def _weld_step(copies: Copies, distance: float) -> IntArray | None:
+def _weld_step(copies: Copies, distance: float, spread: float) -> IntArray | None:
     """One round of edge matching, then of the rims' vertices; each vertex's new root, None when nothing merged."""
     from patchwright.repair._weld_kernel import match_points
 
     points = copies.points
     if not len(copies.free.start):
         return None
-    step, _ = copies.matched(distance)
+    step, _ = copies.matched(distance, spread)
     triangles = step[copies.triangles]
     free = free_edges(triangles, copies.tags)
     true = copies.rim[free.start]  # where only the triangles at the rims are looked at, others end as well
@@ -326,7 +361,7 @@ def _weld_step(copies: Copies, distance: float) -> IntArray | None:
     left, right = _point_pairs(points, free, distance)
     if len(left):
         offsets, around = _around(triangles, len(points))
-        step = match_points(left, right, 1.5 * distance, points, triangles, offsets, around)[step]
+        step = match_points(left, right, spread * distance, points, triangles, offsets, around)[step]
     if np.array_equal(step, np.arange(len(step))):
         return None
     if copies.vertices is None:

@@ -234,3 +234,38 @@ def test_a_rudder_tessellated_patch_by_patch(data: Callable[[str], Path]) -> Non
     areas = result.triangulation.areas
     assert areas[result.origin == BRIDGED].sum() < 2e-3 * areas.sum()
     assert max(action.largest_move for action in result.actions) <= Tolerance.of(dirty).fit
+
+
+def shrunk(whole: Triangulation, inset: float) -> Triangulation:
+    """Every triangle by itself, its corners drawn towards its middle: six copies stand round a point in a ring."""
+    middle = whole.corners.mean(axis=1, keepdims=True)
+    share = 2.0 * inset / np.sqrt(whole.areas)[:, None, None]
+    corners = middle + (whole.corners - middle) * (1.0 - share)
+    return Triangulation(corners.reshape(-1, 3), np.arange(3 * len(whole)).reshape(-1, 3))
+
+
+@pytest.mark.parametrize("inset", [1e-5, 1e-4])
+def test_triangles_drawn_apart_within_the_tolerance_are_welded(inset: float) -> None:
+    whole = shapes.sphere(2)
+    dirty = shrunk(whole, inset)
+    result = mend(dirty, Tolerance.of(dirty))
+    assert result.closed
+    assert not result.problems
+    assert len(result.triangulation.vertices) == len(whole.vertices)
+    assert np.array_equal(result.source, np.arange(len(whole)))
+
+
+@pytest.mark.parametrize("how", ["jitter", "shrunk"])
+@pytest.mark.parametrize("scatter", [4e-4, 3e-3])
+def test_scatter_beyond_the_tolerance_is_refused_with_the_tolerance_it_takes(how: str, scatter: float) -> None:
+    whole = shapes.sphere(3)
+    dirty = shapes.soup(whole, 2.0 * scatter) if how == "jitter" else shrunk(whole, scatter)
+    tolerance = Tolerance.of(dirty)
+    result = mend(dirty, tolerance)
+    assert [problem.kind for problem in result.problems] == ["scatter"]
+    needed = float(result.problems[0].message.split("a tolerance of ")[1].split()[0])
+    assert needed > tolerance.fit
+    again = mend(dirty, Tolerance.of(dirty, fit=needed))
+    assert again.closed
+    assert not again.problems
+    assert len(again.triangulation) == len(whole)
