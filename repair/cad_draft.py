@@ -14,6 +14,7 @@ from patchwright.models.surface import Surface
 from patchwright.models.topology import Topology
 from patchwright.repair.deadline import Deadline
 from patchwright.repair.result import Rung
+from patchwright.repair.vetoes import Vetoes
 
 REACH_SHARE = 0.05  # of the diagonal: rims farther apart than this are no seam that came open
 RIM_SHARE = 0.5  # of a rim's own diagonal: a gap as wide as this is an opening
@@ -26,7 +27,7 @@ FIT_SHARE = 1e-10  # of the diagonal: how near new edges and pcurves follow what
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """The lengths the rungs decide by, in the model's unit, and when they are to end."""
+    """The lengths the rungs decide by, in the model's unit, when they are to end, and what they must leave."""
 
     diagonal: float
     on: float
@@ -34,12 +35,13 @@ class Limits:
     reach: float
     loose: float
     deadline: Deadline
+    vetoes: Vetoes
 
     @classmethod
-    def of(cls, diagonal: float, seconds: float = SECONDS) -> Limits:
+    def of(cls, diagonal: float, seconds: float = SECONDS, vetoes: Vetoes | None = None) -> Limits:
         """The shares above of a diagonal; nothing new is begun after `seconds` of processor time."""
         on, fit, reach, loose = (share * diagonal for share in (ON_SHARE, FIT_SHARE, REACH_SHARE, LOOSE_SHARE))
-        return cls(diagonal, on, fit, reach, loose, Deadline.after(seconds))
+        return cls(diagonal, on, fit, reach, loose, Deadline.after(seconds), vetoes or Vetoes())
 
     @property
     def expired(self) -> bool:
@@ -53,7 +55,7 @@ class Limits:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Change:
-    """One thing a rung did: to which parts, by how much at most, where, and why it may."""
+    """One thing a rung did: to which parts, by how much at most, where, how large the place is, and why it may."""
 
     what: str
     rung: Rung
@@ -62,6 +64,7 @@ class Change:
     tolerance: float
     largest_move: float
     where: Array
+    size: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -102,6 +105,11 @@ class Draft:
     def rims(self) -> tuple[FreeLoop, ...]:
         """Rings and chains of free edges."""
         return free_loops(replace(self.assembly, topology=self.topology, native=None))
+
+    def vetoed(self, change: Change, limits: Limits) -> bool:
+        """Whether the plan rejects a change."""
+        names = [self.parts[face].name for face in change.faces]
+        return limits.vetoes.stop(change.where, change.size, names)
 
     def owners(self) -> dict[int, int]:
         """The face of every edge that is used once."""

@@ -34,7 +34,7 @@ SAME = 0.05  # of a ring's diagonal: how far its box may differ from that of the
 def bridged(outcome: Outcome, after: Diagnosis, decisions: Decisions | None, deadline: Deadline) -> Outcome:
     """Every ring of free edges that diagnosis calls a gap and nobody decided to keep, bridged as far as it goes."""
     model = outcome.assembly
-    gaps = [d for d in after.defects if d.kind == "gap" and d.severity == "error"]
+    gaps = [d for d in after.defects if d.kind == "gap" and d.severity == "error" and not outcome.decided(d)]
     if model.topology is None or not gaps:
         return outcome
     if deadline.passed:

@@ -62,10 +62,13 @@ def ledger_of(model: Assembly, outcome: Outcome, after: Diagnosis, deadline: Dea
         entries.append(
             LedgerEntry(candidate.kind + LEFT_OUT, Rung.KEEP, candidate.parts, why, where=place.where, size=place.size)
         )
+    for one in outcome.rejected:
+        why = "the plan rejects it"
+        entries.append(LedgerEntry(one.kind + LEFT_OUT, Rung.KEEP, one.parts, why, where=one.where, size=one.size))
     for defect in after.defects:
         if outcome.filled and defect.kind == "opening":
             continue
-        if defect.kind in LEFT and defect.severity != "info":
+        if (defect.kind in LEFT and defect.severity != "info") or outcome.decided(defect):
             entries.append(
                 LedgerEntry(
                     f"{defect.kind} left",
@@ -89,6 +92,7 @@ def _entry(model: Assembly, change: Change) -> LedgerEntry:
         tolerance=change.tolerance,
         largest_move=change.largest_move,
         where=point(change.where),
+        size=change.size,
     )
 
 

@@ -12,7 +12,11 @@ from patchwright.models.cad.sewing import SewnResult
 from patchwright.repair.cad_draft import Attempt, Change
 from patchwright.repair.cad_heal import Healed
 from patchwright.repair.decisions import Candidate
+from patchwright.repair.diagnosis import Defect
+from patchwright.repair.fingerprint import Fingerprint
 from patchwright.repair.result import Point
+
+OPEN = ("gap", "open-edge", "seam-gap")  # kinds of defect that stay where a change is left out
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -30,7 +34,7 @@ class Outcome:
     """The assembly after keeping, sewing, healing and filling, with the words for the ledger.
 
     `filled` are its invented parts; `left` the openings and gaps decided to stay; `failed` what was tried in vain after
-    healing; `undone` what the time did not suffice for.
+    healing; `undone` what the time did not suffice for; `rejected` the seams that a plan leaves as they are.
     """
 
     assembly: Assembly
@@ -41,6 +45,19 @@ class Outcome:
     left: tuple[tuple[Candidate, str], ...] = ()
     failed: tuple[Attempt, ...] = ()
     undone: tuple[str, ...] = ()
+    rejected: tuple[Fingerprint, ...] = ()
+
+    def decided(self, defect: Defect) -> bool:
+        """Whether a defect was decided to stay: a gap along the parts, and at the place, of what was left out."""
+        if defect.kind not in OPEN:
+            return False
+        spared = (*self.rejected, *(candidate.fingerprint for candidate, _ in self.left))
+        low, high = defect.box
+        return any(
+            set(one.parts) & set(defect.parts)
+            and (np.maximum(low - one.where, one.where - high) <= 0.5 * one.size).all()
+            for one in spared
+        )
 
     @property
     def changes(self) -> tuple[Change, ...]:

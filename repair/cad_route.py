@@ -6,6 +6,8 @@ between its two surfaces. Sewing is in `cad_sew`, healing in `cad_heal`, what is
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from patchwright.models.arrays import Array, BoolArray
@@ -26,6 +28,7 @@ from patchwright.repair.diagnosing import diagnose
 from patchwright.repair.diagnosis import Defect, Diagnosis
 from patchwright.repair.face_steps import free_edges
 from patchwright.repair.result import Face, LedgerEntry, Problem, Progress, Repaired, Rung, Seam, Verdict
+from patchwright.repair.vetoes import Vetoes
 from patchwright.repair.weld import weld
 
 SECONDS = 600.0  # default time limit
@@ -52,7 +55,9 @@ def repair_cad(
     progress("sewing", 0.2)
     outcome = sewn(model, deadline)
     progress("healing faces and seams", 0.3)
-    outcome = healed(model, outcome, deadline, _folded(model, diagnosis))
+    vetoes = Vetoes.of(decisions)
+    outcome = healed(model, outcome, deadline, _folded(model, diagnosis), vetoes)
+    outcome = replace(outcome, rejected=vetoes.left)
     domain = decisions.surroundings.domain if decisions is not None else None
     after = diagnosis
     if outcome.sewn is not None or outcome.changes:
@@ -63,7 +68,9 @@ def repair_cad(
     outcome = bridged(outcome, after, decisions, deadline)
     if len(outcome.filled) > before:
         after = diagnose(outcome.assembly, tolerance=tolerance, domain=domain)
-    problems = tuple(_problem(d) for d in after.defects if d.severity == "error" and d.kind not in LEFT)
+    problems = tuple(
+        _problem(d) for d in after.defects if d.severity == "error" and d.kind not in LEFT and not outcome.decided(d)
+    )
     if openings == "close" and not problems:
         progress("filling openings", 0.7)
         outcome, problems = closed(outcome, decisions, deadline)

@@ -21,6 +21,7 @@ from patchwright.repair.cad_outcome import Outcome
 from patchwright.repair.deadline import Deadline
 from patchwright.repair.face_steps import free_edges, widest
 from patchwright.repair.retrace import retrace
+from patchwright.repair.vetoes import Vetoes
 
 SHARES = np.array([1e-8, 1e-7, 1e-6, 1e-5, 1e-4])  # of the diagonal: sewing tolerances tried, smallest first
 COINCIDENT = 1e-6  # of the diagonal: edges this near to each other are one edge that the file holds twice
@@ -65,22 +66,24 @@ def sewn(model: Assembly, deadline: Deadline) -> Outcome:
     )
 
 
-def healed(model: Assembly, sewn: Outcome, deadline: Deadline, folded: Collection[int] = ()) -> Outcome:
+def healed(
+    model: Assembly, sewn: Outcome, deadline: Deadline, folded: Collection[int] = (), vetoes: Vetoes | None = None
+) -> Outcome:
     """The sewn model healed, or the model as it came where healing alone closes as much with narrower seams.
 
     Sewing takes edges within its tolerance for one; healing finds the curve where their surfaces meet. So where sewing
-    left free edges or needed more than round-off, both are tried.
+    left free edges or needed more than round-off, both are tried. `vetoes` are what a plan rejects.
     """
     if deadline.passed:
         return replace(sewn, undone=(*sewn.undone, "mending faces and seams"))
-    limits = Limits.of(model.diagonal, deadline.left(HEALING * deadline.limit))
+    limits = Limits.of(model.diagonal, deadline.left(HEALING * deadline.limit), vetoes)
     found = []
     if sewn.sewn is not None and (free_edges(sewn.assembly) or sewn.sewn.tolerance > COINCIDENT * model.diagonal):
         alone = heal(model, limits, folded)
         if alone is not None and alone.changes:
             found.append(Outcome(alone.assembly, None, sewn.reason, alone))
     if not found or free_edges(found[0].assembly):
-        limits = Limits.of(model.diagonal, deadline.left(HEALING * deadline.limit))
+        limits = Limits.of(model.diagonal, deadline.left(HEALING * deadline.limit), vetoes)
         made = heal(sewn.assembly, limits, folded)
         found.append(sewn if made is None else replace(sewn, assembly=made.assembly, healed=made))
 

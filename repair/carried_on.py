@@ -21,6 +21,7 @@ from patchwright.models.extension import surface_on
 from patchwright.models.nurbs_surface import NurbsSurface
 from patchwright.models.surface import Surface
 from patchwright.repair.cad_draft import Change, Draft, Limits
+from patchwright.repair.decisions import CARRIED
 from patchwright.repair.pcurves import BEYOND, within
 from patchwright.repair.result import Rung
 from patchwright.repair.seam_join import COARSE, FINE, join_seams
@@ -117,7 +118,7 @@ def _change(draft: Draft, face: int, old: NurbsSurface, new: NurbsSurface, limit
             a, b = ((x, y) if k == 0 else (y, x) for x, y in zip(uv, ends, strict=True))
             move = max(move, float(np.linalg.norm(new(*a) - new(*b), axis=1).max()))
     return Change(
-        "surface carried on to its neighbours",
+        CARRIED,
         Rung.CUT,
         (face,),
         f"it ended short of them; its end spans' own polynomials go on by up to {move:.3g}",

@@ -13,7 +13,14 @@ from patchwright.repair.surroundings import Surroundings
 
 CAPPED = "opening capped by a plane"
 FILLED = "opening filled by a new surface"
-OPTIONAL = ("bridge", "close", "stray triangles", CAPPED, FILLED)
+TRIMMED = "face trimmed again by its neighbours' edges"
+CROSSED = "trims moved to where the surfaces cross"
+CARRIED_ON = "trims moved to edges that lie on the face"
+STRIPS = "boundary strips moved onto one curve"
+SIDE = "boundary strip moved onto the faces along it"
+CARRIED = "surface carried on to its neighbours"
+SEAM_CLOSING = (TRIMMED, CROSSED, CARRIED_ON, STRIPS, SIDE)
+OPTIONAL = ("bridge", "close", "stray triangles", CAPPED, FILLED, *SEAM_CLOSING)
 """kinds of change that can be rejected: nothing later stands on them, so what they would mend just stays as it is"""
 
 

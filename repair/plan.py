@@ -12,14 +12,19 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from patchwright.models.errors import CorruptFile
-from patchwright.repair.decisions import OPTIONAL
+from patchwright.repair.decisions import CARRIED, OPTIONAL
 from patchwright.repair.fingerprint import Fingerprint, fingerprint, labels, matched
 from patchwright.repair.mended import LEFT_OUT
 from patchwright.repair.result import LedgerEntry, Problem, Rung
 
 VERSION = 1
 _NOWHERE = (0.0, 0.0, 0.0)
-_SUMS = ("pieces of triangles cut where bodies cross", "triangles invented to bridge gaps", "patches fitted")
+_SUMS = (
+    "pieces of triangles cut where bodies cross",
+    "triangles invented to bridge gaps",
+    "patches fitted",
+    CARRIED,
+)
 """ledger entries that sum up what others did, or that follow for every model"""
 
 

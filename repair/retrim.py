@@ -22,6 +22,7 @@ from patchwright.models.nurbs_curve import NurbsCurve
 from patchwright.models.surface import Surface
 from patchwright.models.topology import EdgeUse, Topology
 from patchwright.repair.cad_draft import RIM_SHARE, Change, Draft, Limits, apart
+from patchwright.repair.decisions import TRIMMED
 from patchwright.repair.loop_shape import in_step, outer_first, simple
 from patchwright.repair.meeting import CROSSING, STEPS, farthest, feet, on_both
 from patchwright.repair.pcurves import below, fitted, widened
@@ -54,11 +55,11 @@ def _next(draft: Draft, limits: Limits, cross: bool) -> tuple[Draft, Change] | N
             if not crossing:
                 for face in sorted(faces) if len(faces) > 1 else ():
                     step = _beside(draft, rim, face, owner, limits)
-                    if step is not None:
+                    if step is not None and not draft.vetoed(step[1], limits):
                         return step
         for face in sorted({owner[e] for rim in rims for e, _ in rim.steps}):
             step = _around(draft, rims, face, owner, limits, crossing)
-            if step is not None:
+            if step is not None and not draft.vetoed(step[1], limits):
                 return step
     return None
 
@@ -165,14 +166,16 @@ def _taken(
     grown = draft.with_surfaces({face: widened(surface, points)}, with_loops(topology, {face: loops}), same=True)
     if not simple(loops):
         return None
+    every = np.concatenate([topology.curves[edge].control_points for edge, _ in steps])
     change = Change(
-        "face trimmed again by its neighbours' edges",
+        TRIMMED,
         Rung.CUT,
         (face,),
         f"their edges lie on its surface to {worst:.2g}; its border had come away by {width:.3g}",
         limits.on,
         width,
         centre,
+        float(np.linalg.norm(np.ptp(every, axis=0))),
     )
     return grown, change
 

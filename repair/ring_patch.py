@@ -188,8 +188,8 @@ def _was_smooth(coons: NurbsSurface, side: Side, beside: Beside) -> bool:
     low, high = coons.domain[1 - k]
     t = np.array([low, high]) + IN * (high - low) * np.array([1.0, -1.0])  # nothing leaves a pole itself
     at = np.full(2, coons.domain[k][end])
-    uv = (at, t) if k == 0 else (t, at)
-    across = coons(*uv, (1, 0) if k == 0 else (0, 1))
+    u, v = (at, t) if k == 0 else (t, at)
+    across = coons(u, v, (1, 0) if k == 0 else (0, 1))
     n = beside(t)
     size = np.linalg.norm(across, axis=1)
     if not np.isfinite(n).all() or (size <= 0.0).any():

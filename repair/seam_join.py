@@ -19,6 +19,7 @@ from patchwright.models.nurbs_curve import NurbsCurve
 from patchwright.models.surface import Surface
 from patchwright.models.topology import EdgeUse
 from patchwright.repair.cad_draft import Change, Draft, Limits
+from patchwright.repair.decisions import CARRIED_ON, CROSSED
 from patchwright.repair.face_sides import one_sided
 from patchwright.repair.loop_shape import in_step, simple
 from patchwright.repair.pcurves import below, inside
@@ -30,6 +31,7 @@ from patchwright.repair.seam_pieces import Cut, Piece, cut, seams
 FINE = (1e-6, 1e-5, 1e-4)  # of the diagonal: reaches at which a file's own precision may have left its edges
 COARSE = (3e-4, 1e-3, 3e-3, 1e-2, 3e-2)  # of the diagonal: reaches beyond it, tried after faces have been put back
 TIGHT = 10.0  # of the rungs' finest length: how near a new pcurve follows its edge
+SAMPLES = 9  # of a curve whose extent is taken
 ROUNDS = 8  # times a reach is tried again with the seams left out that do not hold
 
 
@@ -84,6 +86,7 @@ def _joined(draft: Draft, reach: float, limits: Limits, crossing: bool) -> tuple
     uses = uses_of(draft)
     found = [judged(draft, seam, uses, limits) for seam in seams(draft, whole, reach)]
     found = [one for one in found if one.meeting in (Meeting.LIES, Meeting.CROSS)]
+    found = [one for one in found if not (_moves(one, limits) and draft.vetoed(_entry(one, reach), limits))]
     if not crossing:
         found = [one for one in found if one.apart <= EXACT * limits.on]
     for _ in range(ROUNDS):
@@ -91,7 +94,7 @@ def _joined(draft: Draft, reach: float, limits: Limits, crossing: bool) -> tuple
             break
         step = _attempt(draft, whole, found, uses, limits)
         if isinstance(step, Draft):
-            return step, _changes(found, reach)
+            return step, _changes(found, reach, limits)
         found = [one for one in found if id(one) not in step]
     return draft, ()
 
@@ -259,27 +262,36 @@ def _rebuilt(draft: Draft, nodes: Nodes, work: _Work) -> tuple[Draft, set[int]]:
     return draft.with_surfaces(surfaces, compacted(with_loops(new, changed)), same=True), set(changed)
 
 
-def _changes(found: list[Judged], reach: float) -> tuple[Change, ...]:
-    """One entry for the seams that only became one edge, one for those whose trims moved."""
-    out = []
-    for meeting, what, rung, why in (
-        (Meeting.LIES, "edges that lie on both faces shared", Rung.WELD, "each lies on the other face's surface"),
-        (Meeting.CROSS, "trims moved to where the surfaces cross", Rung.CUT, "their surfaces cross beside their edges"),
-    ):
-        some = [one for one in found if one.meeting is meeting]
-        if not some:
-            continue
-        widest = max(some, key=lambda one: one.seam.gap)
-        out.append(
-            Change(
-                what,
-                rung,
-                tuple(sorted({face for one in some for face in one.seam.faces})),
-                f"{len(some)} seams between edges up to {widest.seam.gap:.3g} apart; {why}; looked for within "
-                f"{reach:.3g}",
-                reach,
-                widest.seam.gap,
-                widest.track(np.array([np.mean(widest.track.domain)]))[0],
-            )
-        )
-    return tuple(out)
+def _changes(found: list[Judged], reach: float, limits: Limits) -> tuple[Change, ...]:
+    """One entry for the seams that only became one edge, and one for each whose trims moved."""
+    moved = tuple(_entry(one, reach) for one in found if _moves(one, limits))
+    shared = [one for one in found if not _moves(one, limits)]
+    if not shared:
+        return moved
+    widest = max(shared, key=lambda one: one.seam.gap)
+    faces = tuple(sorted({face for one in shared for face in one.seam.faces}))
+    reason = (
+        f"{len(shared)} seams between edges up to {widest.seam.gap:.3g} apart; each lies on the other face's surface; "
+        f"looked for within {reach:.3g}"
+    )
+    what = "edges that lie on both faces shared"
+    return (Change(what, Rung.WELD, faces, reason, reach, widest.seam.gap, _middle(widest)), *moved)
+
+
+def _moves(one: Judged, limits: Limits) -> bool:
+    """Whether joining a seam moves trims by more than files leave their edges apart."""
+    return one.meeting is Meeting.CROSS or one.seam.gap > FINE[-1] * limits.diagonal
+
+
+def _entry(one: Judged, reach: float) -> Change:
+    """The entry of a seam whose trims move."""
+    gap, cross = one.seam.gap, one.meeting is Meeting.CROSS
+    why = "their surfaces cross beside them" if cross else "one lies on the other face's surface"
+    reason = f"edges {gap:.3g} apart; {why}; looked for within {reach:.3g}"
+    size = float(np.linalg.norm(np.ptp(one.track(np.linspace(*one.track.domain, SAMPLES)), axis=0)))
+    what = CROSSED if cross else CARRIED_ON
+    return Change(what, Rung.CUT, one.seam.faces, reason, reach, gap, _middle(one), size)
+
+
+def _middle(one: Judged) -> Array:
+    return np.asarray(one.track(np.array([np.mean(one.track.domain)]))[0])

@@ -22,6 +22,7 @@ from patchwright.models.knots import divided, greville
 from patchwright.models.nurbs_surface import NurbsSurface, Side
 from patchwright.models.topology import EdgeUse
 from patchwright.repair.cad_draft import Change, Draft, Limits
+from patchwright.repair.decisions import SIDE
 from patchwright.repair.meeting import feet
 from patchwright.repair.result import Rung
 from patchwright.repair.seam_curves import EXACT, FAR, Judged, Meeting, judged, uses_of
@@ -80,7 +81,7 @@ def _next(draft: Draft, reach: float, limits: Limits) -> tuple[Draft, Change] | 
     # long sides first, which leave the several faces along them as they are, and what is nearly closed before the rest
     for moving in sorted(candidates, key=lambda one: (one.short, one.gap)):
         step = _moved(draft, moving, limits)
-        if step is not None:
+        if step is not None and not draft.vetoed(step[1], limits):
             return step
     return None
 
@@ -203,7 +204,7 @@ def _moved(draft: Draft, moving: _Moving, limits: Limits) -> tuple[Draft, Change
     loops[moving.face] = (tuple(row),)
     new = replace(topology, curves=tuple(curves), vertices=vertices, loops=tuple(loops))
     change = Change(
-        "boundary strip moved onto the faces along it",
+        SIDE,
         Rung.STRIP,
         (moving.face,),
         f"its border is NURBS and lies along {len(moving.onto)} face{'s' * (len(moving.onto) > 1)} from end to end "
@@ -211,6 +212,7 @@ def _moved(draft: Draft, moving: _Moving, limits: Limits) -> tuple[Draft, Change
         limits.on,
         moving.gap,
         moving.ends.mean(axis=0),
+        float(np.linalg.norm(moving.ends[1] - moving.ends[0])),
     )
     return draft.with_surfaces({moving.face: surface}, new, same=False), change
 

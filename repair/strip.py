@@ -29,6 +29,7 @@ from patchwright.models.nurbs_surface import NurbsSurface, Side
 from patchwright.models.surface import Surface
 from patchwright.models.topology import EdgeUse, Topology
 from patchwright.repair.cad_draft import Change, Draft, Limits
+from patchwright.repair.decisions import STRIPS
 from patchwright.repair.result import Rung
 
 DEPTH = 4.0  # gap widths that a strip reaches into its face
@@ -67,7 +68,7 @@ class _Pair:
 def strip(draft: Draft, limits: Limits) -> tuple[Draft, tuple[Change, ...]]:
     """Every pair of facing natural borders brought onto one curve, all faces at once."""
     sides = _sides(draft)
-    pairs = _pairs(sides, limits)
+    pairs = [pair for pair in _pairs(sides, limits) if not draft.vetoed(_change(pair, limits), limits)]
     pairs, places = _closed_corners(draft, sides, pairs, limits)
     if not pairs:
         return draft, ()
@@ -460,11 +461,12 @@ def _reversed(draft: Draft, side: _Side, flip: bool) -> bool:
 
 def _change(pair: _Pair, limits: Limits) -> Change:
     return Change(
-        "boundary strips moved onto one curve",
+        STRIPS,
         Rung.STRIP,
         (pair.one.face, pair.two.face),
         f"both borders are NURBS and face each other from end to end across {pair.gap:.3g}",
         limits.fit,
         0.5 * pair.gap,
         0.5 * (pair.one.points[SAMPLES // 2] + pair.two.points[SAMPLES // 2]),
+        float(np.linalg.norm(np.ptp(pair.one.points, axis=0))),
     )

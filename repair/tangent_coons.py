@@ -60,8 +60,8 @@ def worst_angle(surface: NurbsSurface, beside: dict[Side, Beside]) -> float:
         k, end = (0 if side[0] == "u" else 1), int(side[1])
         t = divided(surface.breaks[1 - k], PROBES)
         at = np.full(len(t), surface.domain[k][end])
-        uv = (at, t) if k == 0 else (t, at)
-        own = np.cross(surface(*uv, (1, 0)), surface(*uv, (0, 1)))
+        u, v = (at, t) if k == 0 else (t, at)
+        own = np.cross(surface(u, v, (1, 0)), surface(u, v, (0, 1)))
         other = normals(t)
         size = np.linalg.norm(own, axis=1)
         known = np.isfinite(other).all(axis=1) & (size > 1e-9 * size.max(initial=0.0))
@@ -102,8 +102,8 @@ def _conditions(surface: NurbsSurface, side: Side, normals: Beside) -> tuple[Arr
     k, end = (0 if side[0] == "u" else 1), int(side[1])
     t = _sites(surface.breaks[1 - k])
     at = np.array([surface.domain[k][end]])
-    uv = (np.repeat(at, len(t)), t) if k == 0 else (t, np.repeat(at, len(t)))
-    across = surface(*uv, (1, 0) if k == 0 else (0, 1))
+    u, v = (np.repeat(at, len(t)), t) if k == 0 else (t, np.repeat(at, len(t)))
+    across = surface(u, v, (1, 0) if k == 0 else (0, 1))
     other = normals(t)
     size = np.linalg.norm(across, axis=1)
     known = np.isfinite(other).all(axis=1) & (size > 1e-9 * size.max(initial=0.0))
@@ -111,7 +111,7 @@ def _conditions(surface: NurbsSurface, side: Side, normals: Beside) -> tuple[Arr
     along = _basis(surface, 1 - k, t)
     beside = _basis(surface, k, at, 1)[0]
     products = along[:, None, :] * beside[None, :, None] if k == 0 else along[:, :, None] * beside[None, None, :]
-    size_and_weight = size * _weights(surface, *uv)[known]
+    size_and_weight = size * _weights(surface, u, v)[known]
     rows = products.reshape(len(t), -1, 1) * (other / size_and_weight[:, None])[:, None, :]
     return rows, -np.einsum("ij,ij->i", across, other) / size
 

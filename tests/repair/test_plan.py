@@ -6,16 +6,19 @@ import json
 
 import numpy as np
 import pytest
+from oracles_cad_damage import faces_of, pulled_back, rounded_box, written
 from oracles_shells import box, sphere, tube, without
 
-from patchwright.models import Assembly, Cylinder, Triangulation
+from patchwright.models import Assembly, Cylinder, NurbsSurface, Triangulation
 from patchwright.models.errors import CorruptFile
 from patchwright.models.io import read, write
+from patchwright.models.samples.cube_sphere import cube_sphere_patches
 from patchwright.repair import Plan, plan_repair, repair
 from patchwright.repair.ladder import _task
 from patchwright.repair.mend import mend
 from patchwright.repair.mesh_route import mending_ledger
 from patchwright.repair.plan import compared
+from patchwright.repair.result import Rung, Verdict
 
 BALL = sphere(32)
 HOLES = (40, 400, 700)
@@ -144,3 +147,59 @@ def test_a_plan_says_why_a_repair_would_be_refused() -> None:
 def test_what_is_no_plan_is_told(table: object) -> None:
     with pytest.raises(CorruptFile, match="is no plan of patchwright"):
         Plan.from_json(table)
+
+
+def apart(tmp_path):
+    """The box of 10 x 6 x 4 whose top and one side were cut back along one edge each."""
+    faces = [pulled_back(f, 0.05, 1) if k in (0, 3) else f for k, f in enumerate(faces_of(rounded_box()))]
+    return read(written(tmp_path / "pulled.step", faces, {0, 3}))
+
+
+def test_one_of_two_trims_of_a_cad_model_can_be_rejected(tmp_path) -> None:
+    model = apart(tmp_path)
+    plan = plan_repair(model)
+    trims = [item for item in plan.items if item.rung == Rung.CUT.value]
+    assert len(trims) == 2
+    assert all(item.optional and item.size > 0.0 for item in trims)
+    result = repair(model, plan=edited(plan, trims[0].id))
+    assert result.verdict == Verdict.REPAIRED, result.problems
+    left = [e for e in result.ledger if e.what.endswith("left out")]
+    assert [(e.parts, e.reason) for e in left] == [(trims[0].parts, "the plan rejects it")]
+    done = [e.parts for e in result.ledger if e.rung == Rung.CUT]
+    assert done == [trims[1].parts]
+    assert not result.figures["closed"]
+    assert any(e.what == "gap left" and set(e.parts) & set(trims[0].parts) for e in result.ledger)
+    assert not any("not met" in e.what or "beside" in e.what for e in result.ledger)
+
+
+def test_seams_can_be_rejected_and_no_other_rung_takes_their_place(tmp_path) -> None:
+    write(tmp_path / "sphere.step", Assembly.of([s for b in cube_sphere_patches(0.01).bodies for s in b.surfaces]))
+    model = read(tmp_path / "sphere.step")
+    plan = plan_repair(model)
+    assert len(plan.items) == 12
+    assert all(item.optional for item in plan.items)
+    result = repair(model, plan=edited(plan, *(item.id for item in plan.items)))
+    after = result.to_assembly()
+    assert result.verdict == Verdict.CLEAN
+    for old, new in zip(model.parts, after.parts, strict=True):
+        assert np.array_equal(old.surface.control_points, new.surface.control_points)
+    assert sum(e.what.endswith("left out") for e in result.ledger) == 12
+    assert any(e.what == "gap left" for e in result.ledger)
+
+
+def test_a_boundary_strip_can_be_rejected(tmp_path) -> None:
+    # two curved sheets side by side, one a little higher: their borders neither cross nor touch
+    knots = np.array([0.0, 0, 0, 1, 1, 1])
+    x = np.array([0.0, 0.5, 1.0])
+    net = np.stack([*np.meshgrid(x, x, indexing="ij"), 0.1 * np.outer(x - x**2, np.ones(3))], axis=2)
+    beside = net + np.array([0.0, 1.0, 0.002])
+    write(tmp_path / "sheets.step", Assembly.of([NurbsSurface((2, 2), (knots, knots), one) for one in (net, beside)]))
+    model = read(tmp_path / "sheets.step")
+    plan = plan_repair(model)
+    (item,) = plan.items
+    assert (item.rung, item.optional) == (Rung.STRIP.value, True)
+    result = repair(model, plan=edited(plan, item.id))
+    left = [e for e in result.ledger if e.what.endswith("left out")]
+    assert [(e.parts, e.reason) for e in left] == [(item.parts, "the plan rejects it")]
+    for old, new in zip(model.parts, result.to_assembly().parts, strict=True):
+        assert np.array_equal(old.surface.control_points, new.surface.control_points)
