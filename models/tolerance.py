@@ -10,6 +10,9 @@ import numpy as np
 from patchwright.models.errors import ParameterError
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from patchwright.models.arrays import Array, IntArray
     from patchwright.models.assembly import Assembly
     from patchwright.models.triangulation import Triangulation
 
@@ -24,13 +27,26 @@ class Tolerance:
 
     `gap` is the round-off below which two points are the same; `fit` is how far a fitted surface may stray; `angle`
     separates smooth from sharp edges. `given` says that somebody asked for this fit tolerance, so that it is not to be
-    widened to what the data can carry.
+    widened to what the data can carry. `parts` are names of parts that have a fit tolerance of their own, and those.
     """
 
     gap: float
     fit: float
     angle: float = SMOOTH_ANGLE
     given: bool = False
+    parts: tuple[tuple[str, float], ...] = ()
+
+    @property
+    def tightest(self) -> float:
+        """The least fit tolerance of all: what no part may be moved by without looking."""
+        return min([self.fit, *(length for _, length in self.parts)])
+
+    def of_tags(self, names: Sequence[str], tags: IntArray) -> Array:
+        """(n,) the fit tolerances of the parts that `tags` (n,) number, by their `names`."""
+        own = dict(self.parts)
+        if not own:
+            return np.full(len(tags), self.fit)
+        return np.array([own.get(name, self.fit) for name in names or ("",)])[tags]
 
     @classmethod
     def of(cls, thing: Assembly | Triangulation, *, fit: float | None = None, angle: float = SMOOTH_ANGLE) -> Tolerance:

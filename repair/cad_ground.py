@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from patchwright.models.arrays import BoolArray
+from patchwright.models.arrays import Array, BoolArray
 from patchwright.models.assembly import Assembly
 from patchwright.models.tree import Tree
 from patchwright.models.triangulation import Triangulation
@@ -42,9 +42,16 @@ def on_model(layout: QuadLayout, ground: Tree | TrueGround, assembly: Assembly, 
 
 
 def measured(
-    ground: Tree | TrueGround, after: Triangulation, tolerance: float, skip_before: BoolArray, skip_after: BoolArray
+    ground: Tree | TrueGround,
+    after: Triangulation,
+    tolerance: float | tuple[Array, Array],
+    skip_before: BoolArray,
+    skip_after: BoolArray,
 ) -> Deviation:
-    """Two-sided distance between the ground and the patches' tessellation, without invented triangles."""
+    """Two-sided distance between the ground and the patches' tessellation, without invented triangles.
+
+    `tolerance` is the length coverage is counted against, or one for each triangle of the ground and of `after`.
+    """
     if isinstance(ground, TrueGround):
         return true_deviation(ground, after, tolerance, skip_before, skip_after)
     return two_sided(

@@ -15,7 +15,10 @@ SAMPLES = 60_000
 
 @dataclass(frozen=True, slots=True)
 class Spread:
-    """Area-weighted figures of a set of distances, model units; `coverage` is the share within `tolerance`."""
+    """Area-weighted figures of a set of distances, model units.
+
+    `coverage` is the share within the tolerance of its part, `tolerance` the widest of those.
+    """
 
     median: float
     p99: float
@@ -38,16 +41,20 @@ class Deviation:
         return min(self.input_to_output.coverage, self.output_to_input.coverage)
 
 
-def spread(points: Array, distances: Array, tolerance: float) -> Spread:
-    """Figures of equally weighted distances (n,) measured at points (n, 3); zeros when there are none."""
+def spread(points: Array, distances: Array, tolerance: float | Array) -> Spread:
+    """Figures of equally weighted distances (n,) measured at points (n, 3); zeros when there are none.
+
+    `tolerance` is a length, or one for each distance.
+    """
     if not len(distances):
-        return Spread(0.0, 0.0, 0.0, (0.0, 0.0, 0.0), 1.0, tolerance)
+        return Spread(0.0, 0.0, 0.0, (0.0, 0.0, 0.0), 1.0, float(np.max(tolerance, initial=0.0)))
     worst = int(np.argmax(distances))
     x, y, z = points[worst].tolist()
     median, p99 = np.percentile(distances, [50.0, 99.0])
     return Spread(
-        float(median), float(p99), float(distances[worst]), (x, y, z), float((distances <= tolerance).mean()), tolerance
-    )
+        float(median), float(p99), float(distances[worst]), (x, y, z), float((distances <= tolerance).mean()),
+        float(np.max(tolerance)),
+    )  # fmt: skip
 
 
 def sample_area(triangulation: Triangulation, count: int, seed: int = 0) -> tuple[Array, IntArray]:
@@ -64,10 +71,20 @@ def sample_area(triangulation: Triangulation, count: int, seed: int = 0) -> tupl
     return np.einsum("ij,ijk->ik", weight, triangulation.corners[triangle]), triangle
 
 
+def sampled_limits(
+    tolerance: float | tuple[Array, Array], side: int, kept: BoolArray, triangle: IntArray
+) -> float | Array:
+    """What counts as within tolerance at samples: `triangle` (n,) numbers the `kept` ones of one of two meshes.
+
+    `tolerance` is a length, or one for each triangle of the meshes before (side 0) and after (side 1).
+    """
+    return np.asarray(tolerance[side][kept][triangle]) if isinstance(tolerance, tuple) else tolerance
+
+
 def two_sided(
     before: Triangulation,
     after: Triangulation,
-    tolerance: float,
+    tolerance: float | tuple[Array, Array],
     *,
     skip_before: BoolArray | None = None,
     skip_after: BoolArray | None = None,
@@ -77,16 +94,17 @@ def two_sided(
 
     Parameters
     ----------
-    tolerance : the length coverage is counted against
+    tolerance : the length coverage is counted against, or one for each triangle of both
     skip_before, skip_after : (m,) bool, triangles no distance is taken *from* (invented surface)
     """
 
-    def one_way(source: Triangulation, skip: BoolArray | None, tree: Tree) -> Spread:
-        kept = source if skip is None else source.take(~np.asarray(skip, dtype=bool))
-        points, _ = sample_area(kept, SAMPLES)
-        return spread(points, tree.closest(points).distance if len(points) else np.zeros(0), tolerance)
+    def one_way(source: Triangulation, skip: BoolArray | None, tree: Tree, side: int) -> Spread:
+        kept = np.ones(len(source), dtype=bool) if skip is None else ~np.asarray(skip, dtype=bool)
+        points, triangle = sample_area(source.take(kept), SAMPLES)
+        own = sampled_limits(tolerance, side, kept, triangle)
+        return spread(points, tree.closest(points).distance if len(points) else np.zeros(0), own)
 
     return Deviation(
-        one_way(before, skip_before, Tree.of(after)),
-        one_way(after, skip_after, before_tree or Tree.of(before)),
+        one_way(before, skip_before, Tree.of(after), 0),
+        one_way(after, skip_after, before_tree or Tree.of(before), 1),
     )

@@ -83,11 +83,11 @@ class VertexShapes:
         """(e,) pieces below which an edge has no room for what it owes its ends, at least `fewest`."""
         return np.where(self.bent.all(axis=1), np.maximum(fewest, 4), fewest)
 
-    def settled(self, layout: QuadLayout, curves: EdgeCurves, target: Target, most: float) -> EdgeCurves:
+    def settled(self, layout: QuadLayout, curves: EdgeCurves, target: Target, most: Array) -> EdgeCurves:
         """The curves with their ends as they owe them and, where smooth, fitted to the target again.
 
-        `most` is the length a curve may move for the sake of its curvatures; beside slim patches it moves less, and
-        legs that are turned are only as long as they have room (`leg_room`).
+        `most` (e,) is the length each curve may move for the sake of its curvatures; beside slim patches it moves less,
+        and legs that are turned are only as long as they have room (`leg_room`).
         """
         controls = curves.controls.copy()
         legs, room = leaving(curves), leg_room(layout, curves)

@@ -94,7 +94,7 @@ def repair(
     if result.verdict is not Verdict.REFUSED:
         say("measuring part by part", 0.0)
         inside = task.model.triangulation, result.triangulation
-        result = replace(result, regions=regions(*inside, task.limits.fit, dict(task.around.domain.tolerances)))
+        result = replace(result, regions=regions(*inside, task.limits))
     if plan is None:
         return result
     return replace(result, ledger=(*result.ledger, *_against(plan, result.ledger, task.decisions.diagonal)))
@@ -181,11 +181,9 @@ def _task(
 
 
 def fit_tolerance(model: Assembly, around: Surroundings, fit: float | None) -> Tolerance:
-    """The tolerances of a model: from its body's size; the smallest of those given for single parts holds for all."""
-    given = around.domain.tolerances
-    if fit is None and given:
-        fit = min(given.values())
-    return Tolerance.of(around.body_size(model), fit=fit)
+    """The tolerances of a model: from its body's size, and those given for single parts."""
+    limits = Tolerance.of(around.body_size(model), fit=fit)
+    return replace(limits, parts=tuple(sorted(around.domain.tolerances.items())))
 
 
 def _body(model: Assembly, around: Surroundings, limits: Tolerance) -> tuple[Assembly, tuple[LedgerEntry, ...]]:
@@ -223,7 +221,7 @@ def _cad(task: _Task, openings: str, say: Progress, time_limit: float) -> Repair
 
     return repair_cad(
         task.model,
-        task.limits,
+        replace(task.limits, fit=task.limits.tightest),
         openings=openings,
         diagnosis=task.diagnosis,
         decisions=task.decisions,

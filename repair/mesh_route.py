@@ -73,7 +73,8 @@ def repair_mesh(
     The other arguments are those of `repair`.
     """
     raw = assembly.triangulation
-    mended = mend(raw, tolerance, openings=openings, decisions=decisions, progress=progress)
+    careful = replace(tolerance, fit=tolerance.tightest)
+    mended = mend(raw, careful, openings=openings, decisions=decisions, progress=progress)
     if mended.problems and scope == "all":
         progress("wrapping", 0.0)
         mended = wrapped(mended, raw, tolerance)
@@ -103,7 +104,7 @@ def repair_mesh(
     if isinstance(ground, TrueGround):
         ledger += (true_entry(ground, network, assembly),)
     if scope == "all":
-        tessellation = network.tessellate(network.intervals_within(CHORD * tolerance.fit))
+        tessellation = network.tessellate(network.intervals_within(CHORD * tolerance.tightest))
         tags = network.layout.tags[tessellation.tags] if tessellation.tags is not None else None
         triangulation = replace(tessellation, tags=tags, tag_names=mended.triangulation.tag_names)
     else:
@@ -153,12 +154,16 @@ def _fit(
         progress("laying out quads", attempt / (1 + RETRIES))
         quads = quad_layout(body, target=wanted, angle=tolerance.angle) if isinstance(layout, str) else layout
         if isinstance(layout, str):
-            quads = on_model(quads, ground, assembly, CHORD * tolerance.fit)
-        network = resurface(quads, target, tolerance, noise=mended.noise, progress=progress)
+            quads = on_model(quads, ground, assembly, CHORD * tolerance.tightest)
+        limits = tolerance.of_tags(body.tag_names, quads.tags)
+        network = resurface(quads, target, tolerance, limits=limits, noise=mended.noise, progress=progress)
         progress("measuring coverage", 0.0)
-        intervals = network.intervals_within(CHORD * tolerance.fit)
+        intervals = network.intervals_within(CHORD * tolerance.tightest)
         skip = network_invented(network, intervals)
-        deviation = measured(ground, network.tessellate(intervals), tolerance.fit, invented, skip)
+        tessellation = network.tessellate(intervals)
+        assert tessellation.tags is not None
+        own = tolerance.of_tags(body.tag_names, body.tags if body.tags is not None else np.zeros(len(body), dtype=int))
+        deviation = measured(ground, tessellation, (own, limits[tessellation.tags]), invented, skip)
         if best is None or deviation.coverage > best[1].coverage:
             best = network, deviation
         if deviation.coverage >= COVERAGE_LEAST or not isinstance(layout, str):
@@ -285,7 +290,7 @@ def _fitting_entry(
     network: PatchNetwork, mended: Mended, tolerance: Tolerance, tries: int, resolution: float
 ) -> LedgerEntry:
     worst = float(np.nanmax(network.deviation))
-    over = int((network.deviation > tolerance.fit).sum())
+    over = int((network.deviation > tolerance.of_tags(mended.triangulation.tag_names, network.layout.tags)).sum())
     reason = (
         f"bicubic patches over {len(network)} quads, layout {tries}; {over} stray farther than the fit tolerance; "
         + (f"the input's facets are {resolution:.3g} high" if resolution else "fitted to the true surfaces")

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from patchwright.models.arrays import Array, IntArray
+from patchwright.models.tolerance import Tolerance
 from patchwright.models.tree import Tree
 from patchwright.models.triangulation import Triangulation
 from patchwright.repair.deviation import SAMPLES, Spread, sample_area, spread
@@ -27,25 +28,22 @@ class Region:
     output_to_input: Spread | None
 
 
-def regions(
-    before: Triangulation, after: Triangulation, fit: float, tolerances: dict[str, float] | None = None
-) -> tuple[Region, ...]:
+def regions(before: Triangulation, after: Triangulation, limits: Tolerance) -> tuple[Region, ...]:
     """The deviation of every named part, largest parts first.
 
     Parameters
     ----------
     before, after : input and output, tagged by part name
-    fit : the tolerance coverage is counted against, model length unit
-    tolerances : another tolerance for some parts
+    limits : the fit tolerances coverage is counted against
     """
     there = _by_name(before, Tree.of(after))
     back = _by_name(after, Tree.of(before))
     areas = _areas(before)
     names = sorted({*there, *back}, key=lambda name: -areas.get(name, 0.0))[:MOST]
-    limit = tolerances or {}
+    own = dict(limits.parts)
 
     def figures(found: dict[str, tuple[Array, Array]], name: str) -> Spread | None:
-        return spread(*found[name], limit.get(name, fit)) if name in found else None
+        return spread(*found[name], own.get(name, limits.fit)) if name in found else None
 
     return tuple(Region(name, areas.get(name, 0.0), figures(there, name), figures(back, name)) for name in names)
 

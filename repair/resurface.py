@@ -53,6 +53,7 @@ def resurface(
     target: Target,
     tolerance: Tolerance,
     *,
+    limits: Array | None = None,
     method: str = "smooth",
     noise: float = 0.0,
     progress: Progress | None = None,
@@ -64,6 +65,7 @@ def resurface(
     layout : quads whose vertices and edge paths lie on the target
     target : the mended triangulation and which of its triangles are invented
     tolerance : `.fit` bounds the distance between patches and data at the error samples (HJR 17)
+    limits : (m,) another bound for each patch, a length, or None; an edge keeps the tighter of its patches' bounds
     method : gap filling, see `filling.METHODS`
     noise : scatter of the data
     progress : called with a label and a share in [0, 1]
@@ -73,6 +75,8 @@ def resurface(
     PatchNetwork; `deviation` tells the patches that did not reach the tolerance.
     """
     say = progress or (lambda label, share: None)
+    allowed = np.full(len(layout.quads), tolerance.fit) if limits is None else limits
+    along = np.where(layout.edge_quads >= 0, allowed[layout.edge_quads], np.inf).min(axis=1)
     patch_cells = np.full((len(layout.quads), 2), FIRST_CELLS, dtype=np.int64)
     say("fitting patches", 0.0)
     edges = fit_edge_curves(layout, target, np.full(len(layout.edges), FIRST_CELLS, dtype=np.int64))
@@ -81,17 +85,17 @@ def resurface(
     shapes = VertexShapes.of(layout, edges, state.nets, target)
 
     def fitted(cells: IntArray) -> EdgeCurves:
-        return shapes.settled(layout, fit_edge_curves(layout, target, cells), target, tolerance.fit)
+        return shapes.settled(layout, fit_edge_curves(layout, target, cells), target, along)
 
     def joined(state: _State, *, last: bool = False) -> _State:
-        room = np.maximum(state.error, tolerance.fit)
+        room = np.maximum(state.error, allowed)
         nets = (join_carefully if last else join)(layout, state.nets, room)
         error, restless = patch_errors(nets, everything, target, state.invented)
         return _State(nets, error, restless, state.invented)
 
     edges = fitted(shapes.needed_cells(FIRST_CELLS))
     state = _fit(layout, edges, _needed(layout, edges), everything, None, target, method, noise)
-    state = _unfolded(layout, edges, state, target, tolerance)
+    state = _unfolded(layout, edges, state, target, allowed)
     smooth = joined(state)
     rounds = int(np.log2(MOST_CELLS // FIRST_CELLS))
     barren_edges = np.zeros(len(layout.edges), dtype=np.int64)
@@ -100,7 +104,7 @@ def resurface(
     rough = Roughness.of(layout, smooth.nets, tolerance)
     for turn in range(rounds):
         say("refining patches", (turn + 1) / (rounds + 1))
-        finer = (edge_error > tolerance.fit) & (barren_edges < PATIENCE) & (np.asarray(edges.cells) < MOST_CELLS)
+        finer = (edge_error > along) & (barren_edges < PATIENCE) & (np.asarray(edges.cells) < MOST_CELLS)
         again = finer
         if finer.any():
             cells = np.where(finer, np.asarray(edges.cells) * 2, edges.cells)
@@ -110,7 +114,7 @@ def resurface(
             error = edge_errors(layout, edges, target)
             barren_edges[finer] = np.where(error > WORTH * edge_error, barren_edges + 1, 0)[finer]
             edge_error = error
-        poor = (smooth.error > tolerance.fit) & (barren_patches < PATIENCE)
+        poor = (smooth.error > allowed) & (barren_patches < PATIENCE)
         double = (poor[:, None] & _restless(smooth.restless)) | rough.along
         wanted = np.maximum(np.where(double, 2, 1) * np.asarray(state.nets.cells), _needed(layout, edges))
         wanted = np.where(wanted > MOST_CELLS, state.nets.cells, wanted)
@@ -120,7 +124,7 @@ def resurface(
             break
         before = smooth.error
         state = _fit(layout, edges, wanted, redo, state, target, method, noise)
-        state = _unfolded(layout, edges, state, target, tolerance)
+        state = _unfolded(layout, edges, state, target, allowed)
         smooth = joined(state)
         tried = redo[poor[redo]]
         barren_patches[tried] = np.where(smooth.error > WORTH * before, barren_patches + 1, 0)[tried]
@@ -174,7 +178,7 @@ def _fit(
     return _State(nets, error, restless, invented)
 
 
-def _unfolded(layout: QuadLayout, edges: EdgeCurves, state: _State, target: Target, tolerance: Tolerance) -> _State:
+def _unfolded(layout: QuadLayout, edges: EdgeCurves, state: _State, target: Target, allowed: Array) -> _State:
     """Folded patches give way to the Coons patches of their sides where those fold less and lie as near the data."""
     before = folds(state.nets)
     folded = np.flatnonzero(before > 0.0)
@@ -189,7 +193,7 @@ def _unfolded(layout: QuadLayout, edges: EdgeCurves, state: _State, target: Targ
     coons = PatchNets(state.nets.cells, state.nets.offsets, controls)
     error = state.error.copy()
     error[folded] = patch_errors(coons, folded, target, state.invented)[0][folded]
-    worse = (folds(coons) >= before) | (error > np.maximum(state.error, tolerance.fit))
+    worse = (folds(coons) >= before) | (error > np.maximum(state.error, allowed))
     kept = folded[worse[folded]]
     error[kept] = state.error[kept]
     return _State(_merge(coons, state.nets, kept), error, state.restless, state.invented)

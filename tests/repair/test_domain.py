@@ -133,10 +133,22 @@ def test_gaps_of_a_part_are_kept_as_told(scale: float) -> None:
     assert [d.severity for d in diagnose(model, domain=keep).of("gap")] == ["info"]
 
 
-def test_the_smallest_tolerance_of_the_parts_holds() -> None:
-    model = assembly(nose=hemisphere(True, 0.0), tail=hemisphere(False, 0.0))
-    limits = fit_tolerance(model, surroundings(model, Domain(tolerances={"tail": 1e-3, "nose": 2e-3})), None)
-    assert (limits.fit, limits.given) == (1e-3, True)
+def test_parts_have_fit_tolerances_of_their_own() -> None:
+    fine = sphere(96)  # facets 5e-4 high
+    model = assembly(wing=fine, pod=placed(fine, 1.0, (3, 0, 0)))
+    limits = fit_tolerance(model, surroundings(model, Domain(tolerances={"pod": 3e-2})), 1e-2)
+    assert (limits.fit, limits.tightest, limits.given) == (1e-2, 1e-2, True)
+    assert limits.of_tags(("wing", "pod"), np.array([1, 0, 1])).tolist() == [3e-2, 1e-2, 3e-2]
+    result = repair(model, tolerance=3e-3, domain=Domain(tolerances={"pod": 3e-2}))
+    assert result.network is not None
+    tags = result.network.layout.tags
+    for tag, (name, limit) in enumerate((("wing", 3e-3), ("pod", 3e-2))):
+        assert result.network.deviation[tags == tag].max() <= limit
+        assert [r.input_to_output.tolerance for r in result.regions if r.name == name and r.input_to_output] == [limit]
+    points = [int((np.asarray(result.network.nets.cells)[tags == tag] + 3).prod(axis=1).sum()) for tag in (0, 1)]
+    assert points[1] < 0.8 * points[0]
+    assert result.deviation is not None
+    assert result.deviation.coverage > 0.999
 
 
 def test_mixed_units_are_suspected_and_rivets_are_not() -> None:

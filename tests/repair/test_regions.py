@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from oracles_shells import box, sphere
 
-from patchwright.models import Triangulation
+from patchwright.models import Tolerance, Triangulation
 from patchwright.models.triangulation import concatenate
 from patchwright.repair.regions import regions
 
@@ -24,7 +24,8 @@ def tagged(**parts: Triangulation) -> Triangulation:
 def test_each_part_has_its_own_distance_and_tolerance(offset: float) -> None:
     cube, ball = box(), Triangulation(sphere(16).vertices + np.array([5, 0, 0]), sphere(16).triangles)
     moved = Triangulation(cube.vertices + np.array([0, 0, offset]), cube.triangles)
-    found = {r.name: r for r in regions(tagged(cube=cube, ball=ball), tagged(cube=moved, ball=ball), 1e-4, {"cube": 1})}
+    limits = Tolerance(1e-9, 1e-4, parts=(("cube", 1.0),))
+    found = {r.name: r for r in regions(tagged(cube=cube, ball=ball), tagged(cube=moved, ball=ball), limits)}
     for way in (found["ball"].input_to_output, found["ball"].output_to_input):
         assert way.largest == pytest.approx(0.0, abs=1e-14)
     # the faces across the shift stray by it, the ones along it by less
@@ -36,6 +37,6 @@ def test_each_part_has_its_own_distance_and_tolerance(offset: float) -> None:
 
 def test_what_is_new_and_what_is_gone() -> None:
     cube, ball = box(), sphere(16)
-    new, gone = sorted(regions(tagged(cube=cube), tagged(ball=ball), 1e-4), key=lambda r: r.name)
+    new, gone = sorted(regions(tagged(cube=cube), tagged(ball=ball), Tolerance(1e-9, 1e-4)), key=lambda r: r.name)
     assert (new.name, new.input_to_output, new.area) == ("ball", None, 0.0)
     assert (gone.name, gone.output_to_input) == ("cube", None)
