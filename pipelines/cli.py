@@ -16,11 +16,19 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from patchwright.models.errors import EngineError, GeometryError
+from patchwright.pipelines.domain_options import (
+    FarField,
+    Fluid,
+    Gap,
+    Opening,
+    PartTolerance,
+    Symmetry,
+    domain_of,
+)
 
 if TYPE_CHECKING:
     from patchwright.pipelines.progress import Terminal
     from patchwright.pipelines.study import Study
-    from patchwright.repair.domain import Domain
 
 DONE, FOUND, BAD_INPUT, INTERNAL = 0, 1, 2, 3
 INTERRUPTED = "interrupted; nothing half-written was left"
@@ -54,13 +62,6 @@ Json = Annotated[bool, typer.Option("--json", help="Machine output on stdout, ev
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress.")]
 
 
-FarField = Annotated[list[str] | None, typer.Option("--farfield", help="Part that is far field (repeatable; '' none).")]
-Symmetry = Annotated[
-    list[str] | None, typer.Option("--symmetry", help="Symmetry plane: x, y, z or a planar part (repeatable).")
-]
-Fluid = Annotated[str | None, typer.Option("--fluid", help="X,Y,Z: a point in the fluid.")]
-
-
 @app.command()
 def check(
     files: Annotated[list[str], typer.Argument(help="Files, folders and globs.", show_default=False)],
@@ -76,6 +77,8 @@ def check(
     farfield: FarField = None,
     symmetry: Symmetry = None,
     fluid: Fluid = None,
+    opening: Opening = None,
+    gap: Gap = None,
     json: Json = False,
     quiet: Quiet = False,
 ) -> None:
@@ -88,7 +91,7 @@ def check(
         fail_on=FailOn.of(fail_on),
         baseline=baseline,
         write=write_baseline,
-        domain=_domain(farfield, symmetry, fluid),
+        domain=domain_of(farfield, symmetry, fluid, opening, gap),
         terminal=_terminal(quiet),
     )
     for result in results:
@@ -102,19 +105,6 @@ def check(
     if any(result.error for result in results):
         raise typer.Exit(INTERNAL if any(result.internal for result in results) else BAD_INPUT)
     raise typer.Exit(FOUND if any(result.failing for result in results) else DONE)
-
-
-def _domain(farfield: list[str] | None, symmetry: list[str] | None, fluid: str | None) -> Domain | None:
-    """The flow domain of the command line; an empty far-field name says that there is none."""
-    from patchwright.repair.domain import Domain, place_of
-
-    if not (farfield or symmetry or fluid):
-        return None
-    return Domain(
-        far_field=tuple(name for name in farfield if name) if farfield else None,
-        symmetry=tuple(symmetry) if symmetry else None,
-        fluid=place_of(fluid, "--fluid") if fluid else None,
-    )
 
 
 @app.command()
@@ -135,6 +125,9 @@ def repair(
     farfield: FarField = None,
     symmetry: Symmetry = None,
     fluid: Fluid = None,
+    opening: Opening = None,
+    gap: Gap = None,
+    part_tolerance: PartTolerance = None,
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Only tell what would be done, item by item; --json gives the plan.")
     ] = False,
@@ -166,7 +159,7 @@ def repair(
         layout=str(layout) if layout else "auto",
         time_limit=time_limit,
         tolerance=tolerance,
-        domain=_domain(farfield, symmetry, fluid),
+        domain=domain_of(farfield, symmetry, fluid, opening, gap, part_tolerance),
         plan=plan,
         reject=tuple(reject or ()),
     )

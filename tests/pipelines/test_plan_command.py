@@ -12,6 +12,7 @@ from oracles_shells import sphere, without
 from patchwright.models import ParameterError
 from patchwright.models.errors import CorruptFile
 from patchwright.models.io import write
+from patchwright.pipelines.domain_options import domain_of
 from patchwright.pipelines.planning import load_plan, run_plan
 from patchwright.pipelines.recipe import load_recipe, repair_recipe
 from patchwright.repair import Domain
@@ -57,6 +58,13 @@ def test_what_cannot_be_planned_is_told(holed, monkeypatch, capfd) -> None:
         ("--symmetry", "w"),
         ("--farfield", "hull"),
         ("--fluid", "1,2"),
+        ("--opening", "1,2"),
+        ("--gap", "keep"),
+        ("--gap", "hull=keep"),
+        ("--gap", "part=maybe"),
+        ("--part-tolerance", "part=thin"),
+        ("--part-tolerance", "part=-1"),
+        ("--part-tolerance", "hull=1"),
     ):
         code, _, err = command(monkeypatch, capfd, "repair", holed, *words, "-o", holed.with_name("out"))
         assert code == 2, words
@@ -74,6 +82,20 @@ def test_a_recipe_holds_domain_and_plan(holed) -> None:
     recipe.write_text('source = "ball.stl"\n[domain]\nfarfield = "x"\n[[stage]]\nname = "repair"\n')
     with pytest.raises(ParameterError, match=r"recipe\.toml: a domain has no farfield"):
         load_recipe(recipe)
+
+
+def test_the_command_line_tells_the_whole_domain() -> None:
+    made = domain_of(["room", ""], ["y"], "1,2,3", ["0,0,1", "0,0,-1"], ["flap=keep", "a=b=close"], ["a=b=1e-3"])
+    assert made == Domain(
+        far_field=("room",),
+        symmetry=("y",),
+        fluid=(1.0, 2.0, 3.0),
+        openings=((0.0, 0.0, 1.0), (0.0, 0.0, -1.0)),
+        gaps={"flap": "keep", "a=b": "close"},
+        tolerances={"a=b": 1e-3},
+    )
+    assert domain_of(None, None, None, None, None) is None
+    assert domain_of([""], None, None, None, None) == Domain(far_field=())
 
 
 def test_check_takes_the_domain_too(holed, monkeypatch, capfd) -> None:
