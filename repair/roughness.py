@@ -13,7 +13,7 @@ from patchwright.repair.patch_nets import PatchNets
 from patchwright.repair.quad_layout import QuadLayout
 
 REGULAR = 0.1  # degrees a smooth seam between regular vertices may turn by
-IRREGULAR = 0.5  # degrees any other smooth seam may turn by
+IRREGULAR = 0.25  # degrees any other smooth seam may turn by
 WORTH = 0.8  # twice the pieces must bring the angle below this share of what it was, or they count as barren
 PATIENCE = 1  # barren doublings after which a seam is left as it is
 

@@ -29,10 +29,12 @@ if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
 
 PASSES = 3  # Gauss-Newton steps
+FINAL_PASSES = 5  # the same where the result is not fitted again
 RELEASES = 4  # times the patches that joining spoils are made stiffer
 CREASE = 90.0  # degrees: a seam that turns more is a fold
+MOST_ROOMS = 8.0  # a patch that moves farther than so many rooms is spoiled
 SITES = 3  # Gauss points in each piece of an edge
-ANGLE = 0.5  # degrees left over that count as much as a move by the room a patch has
+ANGLE = 0.1  # degrees left over that count as much as a move by the room a patch has
 LEGS = 0.1  # of a patch's legs: the most room it has, whatever the tolerance
 STRAY = 3.0  # degrees that a step leaves over, beyond which a seam loses its weight
 FOLD = 0.5  # cosine of half the turn beyond which a seam is a fold, which is left
@@ -81,7 +83,9 @@ def gauss(cells: int, count: int = SITES) -> tuple[Array, Array]:
     return at.reshape(-1), np.tile(0.5 * weights / cells, cells)
 
 
-def join(layout: QuadLayout, fitted: PatchNets, room: Array, stiffness: Array | None = None) -> PatchNets:
+def join(
+    layout: QuadLayout, fitted: PatchNets, room: Array, stiffness: Array | None = None, passes: int = PASSES
+) -> PatchNets:
     """The patches with smooth seams.
 
     Parameters
@@ -89,6 +93,7 @@ def join(layout: QuadLayout, fitted: PatchNets, room: Array, stiffness: Array | 
     fitted : the patches as fitted, which the result stays near to
     room : (m,) the move of each patch, a length, that is worth `ANGLE`; no more than `LEGS` of its legs
     stiffness : (m,) how many times more than others each patch stays as it was fitted; default 1
+    passes : Gauss-Newton steps
 
     Seams that cannot be made smooth lose their weight from step to step (Cauchy's), so that they do not bend others.
     """
@@ -98,24 +103,23 @@ def join(layout: QuadLayout, fitted: PatchNets, room: Array, stiffness: Array | 
     for cells, which, _ in fitted.groups():
         sizes[which] = len(_ring(cells).i)
     start = np.concatenate([[0], np.cumsum(sizes)])
-    room = np.minimum(room, LEGS * _legs(fitted))
-    cost = (1.0 if stiffness is None else stiffness) / room**2
+    cost = (1.0 if stiffness is None else stiffness) / np.minimum(room, LEGS * _legs(fitted)) ** 2
     nets = fitted
-    for turn in range(PASSES):
+    for turn in range(passes):
         nets = _step(layout, nets, fitted, start, cost, robust=turn > 0)
     return nets
 
 
 def join_carefully(layout: QuadLayout, fitted: PatchNets, room: Array) -> PatchNets:
-    """The patches with smooth seams, those that would be spoiled kept stiffer, so that their neighbours follow them."""
+    """The patches with smooth seams; those that would be spoiled are kept stiffer and their neighbours follow them."""
     stiffness = np.ones(len(fitted))
-    nets = join(layout, fitted, room)
+    nets = join(layout, fitted, room, passes=FINAL_PASSES)
     for _ in range(RELEASES):
-        worse = spoiled(layout, nets, fitted)
+        worse = spoiled(layout, nets, fitted, room)
         if not worse.any():
             break
         stiffness[worse] *= STIFFER
-        nets = join(layout, fitted, room, stiffness)
+        nets = join(layout, fitted, room, stiffness, FINAL_PASSES)
     return nets
 
 
@@ -130,11 +134,16 @@ def _legs(nets: PatchNets) -> Array:
     return out
 
 
-def spoiled(layout: QuadLayout, nets: PatchNets, fitted: PatchNets) -> BoolArray:
-    """(m,) patches that fold more than they were fitted, and had no fold along their seams instead."""
+def spoiled(layout: QuadLayout, nets: PatchNets, fitted: PatchNets, room: Array) -> BoolArray:
+    """(m,) patches that moved farther than `MOST_ROOMS`, or fold more than they were fitted.
+
+    A fold that a patch got for one it had along its seams is no loss.
+    """
+    away = np.linalg.norm(nets.controls - fitted.controls, axis=1)
+    far = np.maximum.reduceat(away, nets.offsets[:-1]) > MOST_ROOMS * room
     seams = np.where(smooth_edges(layout), seam_angles(layout, side_normals(layout, fitted)), 0.0)
     open_ = (seams[layout.quad_edges] < CREASE).all(axis=1)
-    return np.asarray((folds(nets) > folds(fitted)) & open_)
+    return np.asarray(far | (open_ & (folds(nets) > folds(fitted))))
 
 
 def _step(

@@ -89,7 +89,7 @@ def test_a_disturbed_network_is_made_smooth_and_its_boundaries_stay(ball):
     before, after = (seam_angles(layout, side_normals(layout, n)) for n in (rough, smooth))
     assert np.median(before) > 1.0
     assert after.max() < 0.1 * np.median(before)
-    assert not spoiled(layout, smooth, rough).any()
+    assert not spoiled(layout, smooth, rough, room).any()
     for (_, _, old), (_, _, new) in zip(rough.groups(), smooth.groups(), strict=True):
         assert (old[:, [0, -1]] == new[:, [0, -1]]).all()
         assert (old[:, :, [0, -1]] == new[:, :, [0, -1]]).all()
@@ -128,11 +128,12 @@ def test_stiff_patches_stay_and_their_neighbours_follow(ball):
 
 def test_only_a_patch_that_had_no_folded_seam_is_spoiled_by_a_fold(ball):
     layout, network, _ = ball
-    folded = changed(network.nets, 7, backwards)
-    assert spoiled(layout, folded, network.nets).nonzero()[0].tolist() == [7]
+    folded, room = changed(network.nets, 7, backwards), np.ones(len(network))
+    assert spoiled(layout, folded, network.nets, room).nonzero()[0].tolist() == [7]
     inside_out = changed(network.nets, 7, lambda net: 2.0 * net[[0, -1]].mean(axis=0) - net)
     assert seam_angles(layout, side_normals(layout, inside_out)).max() > 90.0
-    assert not spoiled(layout, folded, inside_out).any()
+    assert not spoiled(layout, folded, inside_out, room).any()
+    assert spoiled(layout, folded, inside_out, 1e-3 * room).nonzero()[0].tolist() == [7]
 
 
 def test_regular_edges_keep_away_from_the_eight_corners_of_the_cube(ball):
