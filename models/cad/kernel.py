@@ -9,6 +9,7 @@ from __future__ import annotations
 from OCP.BinTools import BinTools, BinTools_FormatVersion
 from OCP.BRep import BRep_Builder, BRep_Tool
 from OCP.BRepAdaptor import BRepAdaptor_Curve
+from OCP.BRepAlgoAPI import BRepAlgoAPI_Fuse
 from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeEdge, BRepBuilderAPI_MakeFace, BRepBuilderAPI_Sewing
 from OCP.BRepCheck import BRepCheck_Analyzer
 from OCP.BRepLib import BRepLib
@@ -22,6 +23,7 @@ from OCP.collections import (
     Array2_double,
     Array2_gp_Pnt,
     IndexedMap_TopoDS_Shape_TopTools_ShapeMapHasher,
+    List_TopoDS_Shape,
 )
 from OCP.Geom import (
     Geom_BezierCurve,
@@ -100,6 +102,7 @@ __all__ = [
     "Array2_double",
     "Array2_gp_Pnt",
     "BRepAdaptor_Curve",
+    "BRepAlgoAPI_Fuse",
     "BRepBuilderAPI_MakeEdge",
     "BRepBuilderAPI_MakeFace",
     "BRepBuilderAPI_Sewing",
@@ -158,6 +161,7 @@ __all__ = [
     "IGESSolid_Shell",
     "IndexedMap_TopoDS_Shape_TopTools_ShapeMapHasher",
     "Interface_Static",
+    "List_TopoDS_Shape",
     "Message",
     "REVERSED",
     "SHELL",

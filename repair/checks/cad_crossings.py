@@ -1,4 +1,4 @@
-"""CAD faces that pass through each other or themselves, and faces that fold back: found on the tessellation.
+"""CAD faces that pass through each other or themselves, bodies in others, faces that fold: found on the tessellation.
 
 Two faces cross when their triangles do so deeper somewhere than the tessellation strays from the true surfaces: chords
 of curved faces that merely meet are no crossings, and crossings that are shallow all along are not seen.
@@ -12,13 +12,16 @@ from patchwright.models.adjacency import Adjacency
 from patchwright.models.arrays import Array, BoolArray, IntArray
 from patchwright.models.assembly import Part
 from patchwright.models.triangulation import Triangulation
+from patchwright.repair.cad_bodies import body_labels, closed_bodies, engulfed
 from patchwright.repair.checks.crossing_curves import crossing_curves, total_length
 from patchwright.repair.checks.examination import Examination, box_of
 from patchwright.repair.checks.regions import plural
 from patchwright.repair.checks.registry import Finding, check
 from patchwright.repair.diagnosis import Defect
+from patchwright.repair.sag import sags
 
 SURE = 3.0  # times the sag of both faces' triangles: deeper is a crossing of the surfaces themselves
+SAMPLES = 1_000  # points of a body that are looked for inside others
 STEPS = 65  # places between two triangles where the true normal is looked at
 ROUND = -0.9  # cosine: between two such places it turns round
 VANISHING = 0.1  # of its usual length
@@ -31,33 +34,23 @@ def cad_crossings(exam: Examination) -> Finding:
     mesh, faces = exam.merged, exam.raw.tags
     if faces is None or len(mesh) < 2:
         return Finding()
-    sag = _sag(exam)
+    sag = sags(exam.assembly)
     pairs = exam.tessellation_crossings
     key = np.sort(faces[pairs], axis=1)
     deep = _depth(mesh, pairs) > SURE * sag[key].sum(axis=1) + exam.tolerance.gap
     which = np.unique(key, axis=0, return_inverse=True)[1].reshape(-1)
     real = np.bincount(which, weights=deep)[which] > 0
     pairs, key = pairs[real], key[real]
-    body = _bodies(exam)
+    body = body_labels(exam.assembly)
     over = body[key[:, 0]] != body[key[:, 1]]
+    depth = SURE * float(sag.max(initial=0.0)) + exam.tolerance.gap
     defects = [
+        *_engulfed(exam, body, {(int(a), int(b)) for a, b in body[key[over]]}, depth),
         *_crossing(exam, mesh, pairs[over], np.sort(body[faces[pairs[over]]], axis=1), "overlap"),
         *_crossing(exam, mesh, pairs[~over], key[~over], "self-intersection"),
         *_folds(exam, faces),
     ]
     return Finding(tuple(defects), {"crossing_faces": len(np.unique(key)), "largest_sag": float(sag.max(initial=0.0))})
-
-
-def _sag(exam: Examination) -> Array:
-    """(f,) how far the middles of each face's triangles stray from its surface at the middle of their parameters."""
-    out = np.zeros(len(exam.assembly.parts))
-    for i, part in enumerate(exam.assembly.parts):
-        mesh = part.triangulation
-        if part.surface is not None and mesh.uv is not None and len(mesh):
-            u, v = mesh.uv.mean(axis=1).T
-            off = np.linalg.norm(part.surface(u, v) - mesh.corners.mean(axis=1), axis=1)
-            out[i] = float(np.percentile(off, 99.0))
-    return out
 
 
 def _depth(mesh: Triangulation, pairs: IntArray) -> Array:
@@ -71,20 +64,23 @@ def _depth(mesh: Triangulation, pairs: IntArray) -> Array:
     return depth
 
 
-def _bodies(exam: Examination) -> IntArray:
-    """(f,) label of the body of each face: faces connected by edges, or by the file's own bodies."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    parts, topology = exam.assembly.parts, exam.assembly.topology
-    names = {part.body: i for i, part in enumerate(parts) if part.body}
-    rows = [(i, len(parts) + names[part.body]) for i, part in enumerate(parts) if part.body]
-    for face, loops in enumerate(topology.loops if topology else ()):
-        rows += [(face, 2 * len(parts) + use.edge) for loop in loops for use in loop]
-    size = 2 * len(parts) + (len(topology.curves) if topology else 0)
-    i, j = np.array(rows, dtype=np.int64).reshape(-1, 2).T
-    graph = coo_array((np.ones(len(i), dtype=np.int8), (i, j)), shape=(size, size))
-    return connected_components(graph, directed=False)[1][: len(parts)].astype(np.int64)
+def _engulfed(exam: Examination, label: IntArray, crossing: set[tuple[int, int]], depth: float) -> list[Defect]:
+    """Closed bodies one of which reaches into the other although their faces do not cross, or lies in it whole."""
+    bodies = closed_bodies(exam.assembly)
+    number = {int(label[body[0]]): i for i, body in enumerate(bodies)}
+    known = {(number[a], number[b]) for a, b in crossing if a in number and b in number}
+    found = engulfed(exam.assembly, bodies, known, depth, SAMPLES)
+    defects = []
+    for (a, b), (points, share) in found.items():
+        if a > b and (b, a) in found:
+            continue  # told already, the other way round
+        box = box_of(points)
+        names = tuple(dict.fromkeys(exam.assembly.parts[body[0]].name for body in (bodies[a], bodies[b])))
+        what = "a body lies inside another" if share == 1.0 else f"bodies overlap: {share:.0%} of one lies in the other"
+        message = f"{what}: the bodies of {' and '.join(names)}"
+        size = float(np.linalg.norm(box[1] - box[0]))
+        defects.append(Defect("overlap", "error", box.mean(axis=0), size, names, len(points), message, box))
+    return defects
 
 
 def _crossing(exam: Examination, mesh: Triangulation, pairs: IntArray, key: IntArray, kind: str) -> list[Defect]:
