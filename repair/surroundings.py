@@ -15,11 +15,14 @@ from patchwright.models.adjacency import Adjacency
 from patchwright.models.arrays import Array, BoolArray, IntArray
 from patchwright.models.assembly import Assembly
 from patchwright.models.errors import ParameterError
+from patchwright.models.tree import Tree
 from patchwright.models.triangulation import Triangulation
 from patchwright.repair.domain import AXES, Domain
 
 FAR = 4.0  # times the diagonal of everything else: a body that large around it is a far field
 SCALED = 200.0  # times: larger still, a thing of the model's own size in another unit is likelier
+OPEN = 0.6  # of the area: where area vectors add up to more, there is an open sheet
+TOUCH, PROBES = 1e-3, 1000  # of the smaller thing's diagonal: so near it lies on the larger one; triangles looked at
 PLANE = 1e-5  # of the diagonal: how flat a symmetry plane's rim or face is
 
 
@@ -137,8 +140,8 @@ def surroundings(model: Assembly, domain: Domain | None = None) -> Surroundings:
     if domain.far_field is None:
         pieces = faces_of(mesh) if model.is_cad else _by_part(mesh, pieces_of(mesh, 0.0))
         outer, reason = far_pieces(pieces.low, pieces.high)
-        if len(outer):
-            guessed = np.isin(pieces.label, outer)
+        guessed = np.isin(pieces.label, outer)
+        if len(outer) and _is_body(mesh, guessed):
             aside |= guessed
             far = tuple(model.names[k] for k in np.unique(_tagged(mesh)[guessed]))
             reasons.append(f"{', '.join(far) or 'a piece'} taken for a far field: {reason}")
@@ -220,6 +223,23 @@ def far_pieces(low: Array, high: Array) -> tuple[IntArray, str]:
         return nothing, ""
     reason = f"{len(outer)} of {len(size)} pieces reach {reach:.3g} around a model of {inner[k]:.3g}"
     return outer.astype(np.int64), reason
+
+
+def _is_body(mesh: Triangulation, outer: BoolArray) -> bool:
+    """Whether the triangles that are not `outer` bound a body: a loose scrap of a large surface has none around it.
+
+    The area vectors of a closed surface cancel, those of half a ball are half its area; and a body in a flow does not
+    lie on what bounds that from outside.
+    """
+    inner = np.flatnonzero(~outer)
+    vectors = mesh.take(inner).area_vectors
+    if np.linalg.norm(vectors.sum(axis=0)) > OPEN * np.linalg.norm(vectors, axis=1).sum():
+        return False
+    some = inner[np.unique(np.linspace(0, len(inner) - 1, PROBES).astype(np.int64))]
+    points = mesh.corners[some].reshape(-1, 3)
+    size = float(np.linalg.norm(np.ptp(mesh.vertices[mesh.triangles[inner]].reshape(-1, 3), axis=0)))
+    near = Tree.of(mesh.take(np.flatnonzero(outer))).closest(points).distance <= TOUCH * size
+    return bool(near.mean() <= 0.5)
 
 
 def _tagged(mesh: Triangulation) -> IntArray:

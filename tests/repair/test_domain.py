@@ -66,6 +66,26 @@ def test_a_half_model_connected_with_its_symmetry_plane_is_no_far_field() -> Non
     assert around.body(model).names == ("fuselage", "main", "flap")
 
 
+@pytest.mark.parametrize("flip", [False, True])
+def test_a_loose_scrap_of_a_large_surface_is_no_body_in_a_far_field(flip: bool) -> None:
+    whole = sphere(48)
+    near = np.linalg.norm(whole.corners.mean(axis=1) - 1.0 / np.sqrt(3.0), axis=1) < 0.15
+    scrap = whole.take(near)
+    scrap = Triangulation(scrap.vertices, scrap.triangles[:, ::-1] if flip else scrap.triangles).compact()
+    rest = whole.take(~near).compact()
+    # torn off along its border: as they lie, and with the scrap a little smaller
+    for shrink in (1.0, 0.97):
+        middle = scrap.vertices.mean(axis=0)
+        loose = Triangulation(middle + shrink * (scrap.vertices - middle), scrap.triangles)
+        offset = len(rest.vertices)
+        both = Triangulation(
+            np.concatenate([rest.vertices, loose.vertices]), np.concatenate([rest.triangles, loose.triangles + offset])
+        )
+        around = surroundings(Assembly.of(both))
+        assert not around.aside.any()
+        assert around.far_field == ()
+
+
 def test_named_far_field_of_any_size_is_no_part_of_the_body() -> None:
     model = assembly(body=BALL, room=placed(box(), 3.0, (-1.5, -1.5, -1.5)))
     assert surroundings(model).far_field == (), "too near to be guessed"
