@@ -7,11 +7,11 @@ number); and everything of the bodies that lies outside the others is there.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from patchwright.models.arrays import Array, BoolArray
+from patchwright.models.arrays import Array, BoolArray, IntArray
 from patchwright.models.assembly import Assembly
 from patchwright.models.cad.status import brep_status
 from patchwright.models.cad.uniting import United, unite
@@ -24,7 +24,7 @@ from patchwright.repair.deadline import Deadline
 from patchwright.repair.deviation import sample_area
 from patchwright.repair.diagnosis import Diagnosis
 from patchwright.repair.face_steps import free_edges
-from patchwright.repair.result import LedgerEntry, Rung
+from patchwright.repair.result import Face, LedgerEntry, Rung
 from patchwright.repair.sag import sags
 
 UNCHANGED = 1e-12  # of the diagonal: a kept surface's numbers may differ by round-off only
@@ -36,28 +36,46 @@ MANY = 40  # bodies united in one go
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Union:
-    """A model whose overlapping bodies are one; `cut` are the faces that were cut, `entries` say what was done."""
+    """A model whose overlapping bodies are one, and what was done; `made` is False where they are as they came.
+
+    `cut` are the faces that were cut, `origin` (f,) is the face each one was before.
+    """
 
     model: Assembly
-    cut: frozenset[int]
-    entries: tuple[LedgerEntry, ...]
+    origin: IntArray
+    cut: frozenset[int] = frozenset()
+    entries: tuple[LedgerEntry, ...] = ()
+    made: bool = False
+
+    def labelled(self, faces: tuple[Face, ...], before: tuple[Face, ...] = ()) -> tuple[Face, ...]:
+        """The faces, the kept ones among them with the rung that cut them, or that they had `before`."""
+        if not self.made:
+            return faces
+        out = []
+        for i, face in enumerate(faces):
+            if face.rung in (Rung.KEEP, Rung.WELD) and i < len(self.origin):
+                earlier = before[self.origin[i]].rung if before else face.rung
+                face = replace(face, rung=Rung.CUT if i in self.cut else earlier)
+            out.append(face)
+        return tuple(out)
 
 
 def united(model: Assembly, diagnosis: Diagnosis, deadline: Deadline) -> Union:
     """The model with the closed bodies united that diagnosis found to overlap; as it came where that is not proved."""
     bodies = _overlapping(model, diagnosis)
+    same = np.arange(len(model.parts))
     if len(bodies) < 2 or deadline.passed:
-        return Union(model, frozenset(), ())
+        return Union(model, same)
     places = tuple(sorted({name for body in bodies for name in (model.parts[i].name for i in body)}))
     if len(bodies) > MANY:
-        return Union(model, frozenset(), (_left(model, bodies, places, f"more than {MANY} bodies"),))
+        return Union(model, same, entries=(_left(model, bodies, places, f"more than {MANY} bodies"),))
     try:
         made = unite(model, bodies, time_limit=deadline.left(deadline.limit))
         wrong = _refuted(model, bodies, made)
     except EngineError as error:
         wrong = str(error)
     if wrong:
-        return Union(model, frozenset(), (_left(model, bodies, places, wrong),))
+        return Union(model, same, entries=(_left(model, bodies, places, wrong),))
     return _told(model, bodies, made, places)
 
 
@@ -127,7 +145,7 @@ def _told(model: Assembly, bodies: list[list[int]], made: United, names: tuple[s
             size=size,
         )
     )  # fmt: skip
-    return Union(made.assembly, cut, tuple(entries))
+    return Union(made.assembly, made.origin, cut, tuple(entries), made=True)
 
 
 def _left(model: Assembly, bodies: list[list[int]], names: tuple[str, ...], why: str) -> LedgerEntry:
