@@ -23,6 +23,8 @@ MOST_VERTICES = 200_000  # free edges up to which t-junctions are looked for
 @check("t-junctions", looks="mesh", kinds=("t-junction",))
 def t_junctions(exam: Examination) -> Finding:
     """Free edges with the corner of another free edge on them: a seam whose two sides are meshed differently."""
+    if np.count_nonzero(exam.body_adjacency.free) > MOST_VERTICES:
+        return Finding(figures={"t_junctions": None, "t_junctions_why": "too many free edges to look along"})
     hits = exam.junctions
     if not len(hits):
         return Finding(figures={"t_junctions": 0})

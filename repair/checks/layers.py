@@ -24,7 +24,7 @@ def layers(exam: Examination) -> Finding:
     """What lies right above or below each triangle, along its normal.
 
     The next skin turned the same way, within `REACH`, is a second layer. One turned the other way, with the void
-    between, is another body's: it touches within round-off, or the clearance is told where it is below `CLEAR`.
+    between, is another body's: it touches within round-off, or the clearance is told, as a warning below `CLEAR`.
     """
     body = exam.oriented.triangulation
     if len(body) < 2:
@@ -45,12 +45,14 @@ def layers(exam: Examination) -> Finding:
     facing &= ~_crossing(exam, own, other, facing)
     touching = facing & (apart <= near)
     narrow = facing & ~touching & (apart <= CLEAR * exam.tolerance.fit)
+    clear = facing & (apart > CLEAR * exam.tolerance.fit)
 
     skins = own, other, apart
     defects = [
         *_found(exam, "overlap", "error", skins, same, "lie in two layers"),
         *_found(exam, "overlap", "warning", skins, touching, "of two bodies touch face to face"),
         *_found(exam, "gap", "warning", skins, narrow, "of two bodies all but touch"),
+        *_found(exam, "gap", "info", skins, clear, "of two bodies face each other across a narrow clearance"),
     ]
     figures = {"double_layers": int(np.count_nonzero(same)), "contacts": int(np.count_nonzero(touching))}
     return Finding(tuple(defects), figures)

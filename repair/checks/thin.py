@@ -8,7 +8,7 @@ from patchwright.repair.checks.examination import Examination
 from patchwright.repair.checks.regions import plural, regional
 from patchwright.repair.checks.registry import Finding, check
 
-MOST = 4000  # triangles that are probed
+MOST = 20_000  # triangles that are probed
 SKINS = 2.0  # times the fit tolerance: both skins may stray by it
 OPPOSED = -0.5  # cosine: the far skin faces away
 

@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Callable
 from functools import partial
 
+import dirty_shapes as shapes
 import numpy as np
 import pytest
 from oracles_shells import box, moved, sphere, tube
@@ -173,3 +174,32 @@ def test_clean_shapes_give_nothing_wherever_they_lie(shape: str) -> None:
 def test_an_open_sheet_gives_its_border_only() -> None:
     found = diagnose(samples.wavy_patch().assembly)
     assert [(d.kind, d.severity) for d in found.defects] == [("opening", "warning")]
+
+
+@pytest.mark.parametrize("scale", [1e-3, 1e3])
+@pytest.mark.parametrize("fits", [0.5, 1.5, 4.0, 20.0])
+def test_the_clearance_between_two_bodies_is_told_with_its_width(fits: float, scale: float) -> None:
+    one = shapes.box((1, 1, 1))
+    width = fits * 1e-4 * np.sqrt(6.0)  # of the diagonal of both
+    other = Triangulation(one.vertices + np.array([1.0 + width, 0.0, 0.0]), one.triangles)
+    parts = [Part(n, Triangulation(scale * t.vertices, t.triangles)) for n, t in (("left", one), ("right", other))]
+    found = diagnose(Assembly(tuple(parts))).of("gap")
+    assert len(found) == (fits <= 10.0)
+    for gap in found:
+        assert gap.size == pytest.approx(scale * width, rel=1e-6)
+        assert gap.parts == ("left", "right")
+        assert gap.severity == ("warning" if fits <= 2.0 else "info")
+        assert np.allclose(gap.where, scale * np.array([0.5, 0.0, 0.0]), atol=scale * width)
+
+
+@pytest.mark.parametrize("thickness", [1e-4, 1e-2])
+def test_thin_parts_of_a_thick_model_are_found_with_their_place(thickness: float) -> None:
+    # a fin of few triangles beside a ball of many
+    fin = shapes.box((0.3, 0.2, thickness))
+    fin = Triangulation(fin.vertices + np.array([2.0, 0.0, 0.0]), fin.triangles)
+    found = diagnose(Assembly((Part("ball", shapes.sphere(5)), Part("fin", fin)))).of("thin")
+    assert len(found) == (thickness < 1e-3)
+    for thin in found:
+        assert thin.parts == ("fin",)
+        assert np.linalg.norm(thin.where - [2.0, 0.0, 0.0]) < 0.1
+        assert thin.count > 20
