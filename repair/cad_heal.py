@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 from patchwright.models.assembly import Assembly
+from patchwright.models.cad.connectivity import components
 from patchwright.models.cad.editing import welded
 from patchwright.models.cad.sewing import sew
 from patchwright.models.cad.status import brep_status
@@ -133,10 +134,11 @@ def _climbed(
         draft, again = retrim(draft, limits, crossing=False)
         moved_back = {face for change in put_back for face in change.faces}
         changes = (*changes, *put_back, *(c for c in again if not moved_back & set(c.faces)))
-    draft, joined = join_seams(draft, limits, after, crossing=False)
+    loose = _loose(draft)
+    draft, joined = join_seams(draft, limits, after, crossing=False, loose=loose)
     draft, sized = realign(draft, limits, sized=True)
-    draft, more = join_seams(draft, limits, after)
-    draft, carried = join_carried_on(draft, limits)
+    draft, more = join_seams(draft, limits, after, loose=loose)
+    draft, carried = join_carried_on(draft, limits, loose=loose)
     changes = (*changes, *joined, *sized, *more, *carried)
     if crossing:
         draft, crossed = retrim(draft, limits)
@@ -145,6 +147,12 @@ def _climbed(
     draft, sides = strip_sides(draft, limits)
     changes = (*changes, *moved, *sides)
     return draft, changes
+
+
+def _loose(draft: Draft) -> frozenset[int]:
+    """The faces that are joined with no other."""
+    pieces = components(draft.topology)
+    return frozenset(piece[0] for piece in pieces if len(piece) == 1) if len(pieces) > 1 else frozenset()
 
 
 def _closed(model: Assembly, draft: Draft, limits: Limits, gap: float) -> Assembly | None:

@@ -1,4 +1,4 @@
-"""The ladder for CAD faces: keep, sew round-off, heal faces and seams, bridge gaps, fill openings when asked, refuse.
+"""The ladder for CAD faces: keep, drop copies, sew round-off, heal faces and seams, bridge gaps, fill openings, refuse.
 
 A kept face has the surface it came with, checked to 1e-12; a seam counts as closed only by the distance measured
 between its two surfaces. Sewing is in `cad_sew`, healing in `cad_heal`, what is invented in `cad_fill`.
@@ -15,12 +15,14 @@ from patchwright.models.assembly import Assembly
 from patchwright.models.cad.seams import measure_seams
 from patchwright.models.tolerance import Tolerance
 from patchwright.models.triangulation import Triangulation
+from patchwright.repair.cad_copies import without_copies
 from patchwright.repair.cad_draft import Change
 from patchwright.repair.cad_fill import bridged, closed
 from patchwright.repair.cad_grid import cad_grid
 from patchwright.repair.cad_ledger import LEFT, ledger_of
 from patchwright.repair.cad_outcome import Outcome, point
 from patchwright.repair.cad_sew import healed, sewn
+from patchwright.repair.cad_union import Union, united
 from patchwright.repair.deadline import Deadline
 from patchwright.repair.decisions import Decisions
 from patchwright.repair.deviation import two_sided
@@ -53,14 +55,17 @@ def repair_cad(
     """
     deadline = Deadline.after(time_limit)
     progress("sewing", 0.2)
-    outcome = sewn(model, deadline)
+    once, copies = without_copies(model)
+    union = united(once, diagnosis, deadline)
+    once, first = union.model, (*copies, *union.entries)
+    outcome = sewn(once, deadline)
     progress("healing faces and seams", 0.3)
     vetoes = Vetoes.of(decisions)
-    outcome = healed(model, outcome, deadline, _folded(model, diagnosis), vetoes)
+    outcome = healed(once, outcome, deadline, _folded(once, diagnosis), vetoes)
     outcome = replace(outcome, rejected=vetoes.left)
     domain = decisions.surroundings.domain if decisions is not None else None
     after = diagnosis
-    if outcome.sewn is not None or outcome.changes:
+    if outcome.sewn is not None or outcome.changes or copies or union.made:
         progress("checking the mended shell", 0.6)
         after = diagnose(outcome.assembly, tolerance=tolerance, domain=domain)
     progress("bridging gaps", 0.65)
@@ -74,7 +79,13 @@ def repair_cad(
     if openings == "close" and not problems:
         progress("filling openings", 0.7)
         outcome, problems = closed(outcome, decisions, deadline)
-    ledger = ledger_of(model, outcome, after, deadline)
+    if problems and not union.made:
+        late = united(outcome.assembly, after, deadline)
+        if late.made:
+            ledger = (*first, *ledger_of(once, outcome, after, deadline), *late.entries)
+            progress("repairing the united bodies", 0.7)
+            return _continued(model, outcome, late, ledger, tolerance, openings, decisions, deadline, progress)
+    ledger = (*first, *ledger_of(once, outcome, after, deadline))
     body, deviation = _triangulated(outcome.assembly, tolerance), None
     if problems:
         return Repaired(
@@ -92,15 +103,20 @@ def repair_cad(
     made_up = _invented(outcome)
     areas = np.array([part.triangulation.areas.sum() for part in outcome.assembly.parts])
     deviation = two_sided(
-        model.triangulation, body, tolerance.fit, skip_after=None if body.tags is None else made_up[body.tags]
+        model.triangulation,
+        body,
+        tolerance.fit,
+        skip_before=union.hidden(model.triangulation),
+        skip_after=None if body.tags is None else made_up[body.tags],
     )
-    verdict = Verdict.CLEAN if outcome.sewn is None and not outcome.changes else Verdict.REPAIRED
+    untouched = outcome.sewn is None and not outcome.changes and not copies and not union.made
+    verdict = Verdict.CLEAN if untouched else Verdict.REPAIRED
     if made_up.any():
         verdict = Verdict.INVENTED
     blocks = (grid is not None and len(grid.blocks)) or 0
     return Repaired(
         verdict,
-        _faces(outcome, areas),
+        union.labelled(_faces(outcome, areas)),
         seams,
         body,
         ledger,
@@ -111,6 +127,39 @@ def repair_cad(
         grid=grid,
         figures=_figures(outcome.assembly, seams, blocks, after, len(outcome.filled)),
     )
+
+
+def _continued(
+    model: Assembly,
+    outcome: Outcome,
+    late: Union,
+    ledger: tuple[LedgerEntry, ...],
+    tolerance: Tolerance,
+    openings: str,
+    decisions: Decisions | None,
+    deadline: Deadline,
+    progress: Progress,
+) -> Repaired:
+    """The repair of bodies that could be united only after their own faces were sewn or healed."""
+    domain = decisions.surroundings.domain if decisions is not None else None
+    again = repair_cad(
+        late.model,
+        tolerance,
+        openings=openings,
+        diagnosis=diagnose(late.model, tolerance=tolerance, domain=domain),
+        decisions=decisions,
+        time_limit=deadline.left(deadline.limit),
+        progress=progress,
+    )
+    ledger = (*ledger, *again.ledger)
+    if again.deviation is None:
+        return replace(again, ledger=ledger)
+    hidden = late.hidden(model.triangulation)
+    deviation = two_sided(model.triangulation, again.triangulation, tolerance.fit, skip_before=hidden)
+    verdict = Verdict.REPAIRED if again.verdict is Verdict.CLEAN else again.verdict
+    areas = np.array([part.triangulation.areas.sum() for part in outcome.assembly.parts])
+    faces = late.labelled(again.faces, _faces(outcome, areas))
+    return replace(again, verdict=verdict, faces=faces, ledger=ledger, deviation=deviation)
 
 
 def _folded(model: Assembly, diagnosis: Diagnosis) -> set[int]:

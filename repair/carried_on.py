@@ -10,6 +10,7 @@ Limits: weights must not vanish farther out; what was a spline approximation of 
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import replace
 
 import numpy as np
@@ -33,7 +34,7 @@ MOST = 0.25  # of a surface's range: what is carried on farther has little to do
 
 
 def join_carried_on(
-    draft: Draft, limits: Limits, shares: tuple[float, ...] = (*FINE, *COARSE)
+    draft: Draft, limits: Limits, shares: tuple[float, ...] = (*FINE, *COARSE), loose: Collection[int] = ()
 ) -> tuple[Draft, tuple[Change, ...]]:
     """Every seam that faces make once their surfaces are carried on, at each share of the diagonal in turn."""
     changes: list[Change] = []
@@ -43,7 +44,9 @@ def join_carried_on(
         longer = _longer(draft, share * limits.diagonal)
         if not longer:
             continue
-        wide, joined = join_seams(draft.with_surfaces(longer, draft.topology, same=False), limits, (share,))
+        wide, joined = join_seams(
+            draft.with_surfaces(longer, draft.topology, same=False), limits, (share,), loose=loose
+        )
         if not joined:
             continue
         touched = {face for change in joined for face in change.faces}

@@ -18,7 +18,7 @@ import numpy as np
 
 from patchwright.models.analytic import Plane
 from patchwright.models.arrays import Array, IntArray
-from patchwright.models.cad.connectivity import components
+from patchwright.models.cad.connectivity import components, is_point
 from patchwright.models.cad.editing import Loops, with_loops
 from patchwright.models.closest_point import closest_on_curve
 from patchwright.models.nurbs_curve import NurbsCurve
@@ -80,7 +80,8 @@ def realign(draft: Draft, limits: Limits, *, sized: bool = False) -> tuple[Draft
     `sized` allows a change of size too. Rings and rectangles of any size fit each other, so that is weak evidence where
     trims can be carried on to the neighbours instead: it is for what is left after that.
     """
-    topology, owner = draft.topology, draft.owners()
+    topology = draft.topology
+    owner = {e: f for e, f in draft.owners().items() if not is_point(topology.curves[e])}
     groups = components(topology)
     areas = [sum(_size(draft, face) for face in group) for group in groups]
     group_of = {face: number for number, group in enumerate(groups) for face in group}

@@ -15,6 +15,7 @@ import numpy as np
 
 from patchwright.models.arrays import Array
 from patchwright.models.cad.capping import FreeLoop
+from patchwright.models.cad.connectivity import components
 from patchwright.models.cad.editing import in_chains, with_loops
 from patchwright.models.errors import GeometryError
 from patchwright.models.extension import curve_on
@@ -49,10 +50,11 @@ def retrim(draft: Draft, limits: Limits, *, crossing: bool = True) -> tuple[Draf
 
 def _next(draft: Draft, limits: Limits, cross: bool) -> tuple[Draft, Change] | None:
     rims, owner = draft.rims(), draft.owners()
+    piece = {face: k for k, group in enumerate(components(draft.topology)) for face in group}
     for crossing in (False, True) if cross else (False,):  # what lies on a surface already comes first
         for rim in rims:
             faces = {owner[edge] for edge, _ in rim.steps}
-            if not crossing:
+            if not crossing and not any(_over(rim, other, piece, limits) for other in rims):
                 for face in sorted(faces) if len(faces) > 1 else ():
                     step = _beside(draft, rim, face, owner, limits)
                     if step is not None and not draft.vetoed(step[1], limits):
@@ -62,6 +64,14 @@ def _next(draft: Draft, limits: Limits, cross: bool) -> tuple[Draft, Change] | N
             if step is not None and not draft.vetoed(step[1], limits):
                 return step
     return None
+
+
+def _over(rim: FreeLoop, other: FreeLoop, piece: dict[int, int], limits: Limits) -> bool:
+    """Whether another piece's rim lies along a rim all round: what belongs there has only come away."""
+    if piece[rim.faces[0]] == piece[other.faces[0]]:
+        return False
+    near = min(limits.reach, RIM_SHARE * rim.diagonal)
+    return max(float(apart(rim.points, other.points).max()), float(apart(other.points, rim.points).max())) <= near
 
 
 def _beside(

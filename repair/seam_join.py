@@ -8,6 +8,7 @@ next rung. A curve counts when it is within half of a closed seam's gap of both 
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -64,27 +65,35 @@ class _Work:
 
 
 def join_seams(
-    draft: Draft, limits: Limits, shares: tuple[float, ...] = FINE, *, crossing: bool = True
+    draft: Draft,
+    limits: Limits,
+    shares: tuple[float, ...] = FINE,
+    *,
+    crossing: bool = True,
+    loose: Collection[int] = (),
 ) -> tuple[Draft, tuple[Change, ...]]:
     """Every seam whose faces meet in a curve near their edges, at each share of the diagonal in turn.
 
-    Without `crossing` only edges that lie on the other face to round-off count.
+    Without `crossing` only edges that lie on the other face to round-off count. `loose` are faces that came loose as a
+    whole: their seams may be wider for their length.
     """
     changes: list[Change] = []
     for share in shares:
         if limits.expired:
             break
-        draft, more = _joined(draft, share * limits.diagonal, limits, crossing)
+        draft, more = _joined(draft, share * limits.diagonal, limits, crossing, loose)
         changes += more
     if changes:
         draft = replace(draft, topology=one_sided(draft.topology))
     return draft, tuple(changes)
 
 
-def _joined(draft: Draft, reach: float, limits: Limits, crossing: bool) -> tuple[Draft, tuple[Change, ...]]:
+def _joined(
+    draft: Draft, reach: float, limits: Limits, crossing: bool, loose: Collection[int]
+) -> tuple[Draft, tuple[Change, ...]]:
     whole = cut(draft, reach)
     uses = uses_of(draft)
-    found = [judged(draft, seam, uses, limits) for seam in seams(draft, whole, reach)]
+    found = [judged(draft, seam, uses, limits) for seam in seams(draft, whole, reach, loose)]
     found = [one for one in found if one.meeting in (Meeting.LIES, Meeting.CROSS)]
     found = [one for one in found if not (_moves(one, limits) and draft.vetoed(_entry(one, reach), limits))]
     if not crossing:

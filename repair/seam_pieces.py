@@ -8,6 +8,7 @@ seam, led by the long edge.
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from itertools import combinations, pairwise
 
@@ -20,7 +21,8 @@ from patchwright.models.nurbs_curve import NurbsCurve
 from patchwright.repair.cad_draft import Draft
 
 SAMPLES = 17  # per piece where its distance from another is measured
-SLENDER = 0.1  # of a piece's length: pieces farther apart are no seam
+SLENDER = 0.1  # of a piece's length: pieces farther apart are no seam ...
+STOUT = 0.5  # ... or, of a face that came loose as a whole, so that it has to go somewhere, farther apart than this
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -149,8 +151,8 @@ def _nodes(draft: Draft, free: list[int], reach: float) -> dict[int, int]:
     return {vertex: min(some) for vertex, some in group.items()}
 
 
-def seams(draft: Draft, whole: Cut, reach: float) -> list[Seam]:
-    """The seams the pieces make."""
+def seams(draft: Draft, whole: Cut, reach: float, loose: Collection[int] = ()) -> list[Seam]:
+    """The seams the pieces make; `loose` are faces that came loose as a whole."""
     curves = draft.topology.curves
     by_nodes: dict[tuple[int, int], list[Piece]] = {}
     for some in whole.pieces.values():
@@ -162,7 +164,8 @@ def seams(draft: Draft, whole: Cut, reach: float) -> list[Seam]:
             if a.face == b.face:
                 continue
             gap, length = _gap(curves[a.edge], a, curves[b.edge], b)
-            if gap > min(reach, SLENDER * length):
+            most = STOUT if a.face in loose or b.face in loose else SLENDER
+            if gap > min(reach, most * length):
                 continue
             for one, other in ((a, b), (b, a)):
                 if one not in best or gap < best[one][0]:

@@ -8,7 +8,12 @@ import numpy as np
 from OCP.BRep import BRep_Builder, BRep_Tool
 from OCP.BRepAdaptor import BRepAdaptor_Curve
 from OCP.BRepAlgoAPI import BRepAlgoAPI_Cut
-from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeEdge, BRepBuilderAPI_MakeFace, BRepBuilderAPI_MakeWire
+from OCP.BRepBuilderAPI import (
+    BRepBuilderAPI_Copy,
+    BRepBuilderAPI_MakeEdge,
+    BRepBuilderAPI_MakeFace,
+    BRepBuilderAPI_MakeWire,
+)
 from OCP.BRepBuilderAPI import BRepBuilderAPI_Transform as Transform
 from OCP.BRepCheck import BRepCheck_Analyzer
 from OCP.BRepFilletAPI import BRepFilletAPI_MakeFillet
@@ -81,6 +86,16 @@ def shrunk(face, factor):
     return TopoDS.Face(Transform(face, motion, True).Shape())
 
 
+def reversed_face(face):
+    """The face with its normal on the other side."""
+    return TopoDS.Face(face.Reversed())
+
+
+def with_own_edges(face):
+    """A copy that shares no edge with any other face."""
+    return TopoDS.Face(BRepBuilderAPI_Copy(face).Shape())
+
+
 def pulled_back(face, width, which=0):
     """The face without the strip of a width along its longest edge (which=0), the next (1), ...; surface unchanged."""
     edges = [TopoDS.Edge(edge) for edge in parts_of(face, TopAbs_ShapeEnum.TopAbs_EDGE)]
@@ -111,6 +126,17 @@ def without_strips(face, edges, width):
 def length(edge) -> float:
     properties = GProp_GProps()
     BRepGProp.LinearProperties_s(edge, properties)
+    return properties.Mass()
+
+
+def perimeter_of(face) -> float:
+    """The length of all edges of a face."""
+    return sum(length(TopoDS.Edge(edge)) for edge in parts_of(face, TopAbs_ShapeEnum.TopAbs_EDGE))
+
+
+def area_of(face) -> float:
+    properties = GProp_GProps()
+    BRepGProp.SurfaceProperties_s(face, properties)
     return properties.Mass()
 
 

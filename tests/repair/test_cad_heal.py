@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox, BRepPrimAPI_MakeCylinder
+from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox, BRepPrimAPI_MakeCylinder, BRepPrimAPI_MakeSphere
+from OCP.gp import gp_Ax2, gp_Dir, gp_Pnt
 from oracles_cad_damage import (
     ROUNDED_VOLUME,
     SIZES,
@@ -299,3 +300,29 @@ def unit(rng):
     """A random direction."""
     vector = rng.normal(size=3)
     return vector / np.linalg.norm(vector)
+
+
+def test_a_displaced_half_of_a_hole_is_put_back_and_the_other_half_not_grown_over_its_place(data, tmp_path):
+    # both halves lie on one cylinder, so the rest of the hole's rim lies on the surface of the half that stayed
+    faces = faces_of(read_shape(data("featuretype.step")))
+    faces[68] = shifted(faces[68], (0.3, 0.2, 0.25))
+    before = read(written(tmp_path / "half.step", faces, {68}))
+    result, again = healed(tmp_path / "half.step", tmp_path)
+    is_sound(again, tmp_path / "healed.step")
+    assert len(identical(result, before)) >= len(faces) - 1
+
+
+def test_a_displaced_cap_with_a_pole_is_put_back(tmp_path):
+    # half a ball on a tube: the pole is an edge without length that no neighbour answers
+    radius, height = 1.0, 2.0
+    tube = faces_of(BRepPrimAPI_MakeCylinder(radius, height).Shape())
+    open_tube = [face for face in tube if centre(face).Z() < height - 1e-6]
+    up = gp_Ax2(gp_Pnt(0, 0, height), gp_Dir(0, 0, 1))
+    ball = faces_of(BRepPrimAPI_MakeSphere(up, radius, 0.0, 0.5 * np.pi).Shape())
+    cap = max(ball, key=lambda face: centre(face).Z())
+    path = written(tmp_path / "cap.step", [*open_tube, shifted(cap, (0.01, -0.005, 0.02))], {len(open_tube)})
+    result, _ = healed(path, tmp_path)
+    assert solid_volume(read_shape(tmp_path / "healed.step")) == pytest.approx(
+        np.pi * radius**2 * height + 2 / 3 * np.pi * radius**3, rel=1e-9
+    )
+    assert [e.rung for e in result.ledger if e.rung == Rung.REALIGN] == [Rung.REALIGN]

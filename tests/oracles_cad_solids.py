@@ -1,0 +1,51 @@
+"""CAD solids made by the CAD kernel alone: a box with all edges rounded, a tapered wing lofted through airfoils."""
+
+from __future__ import annotations
+
+import numpy as np
+from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeEdge, BRepBuilderAPI_MakeWire
+from OCP.BRepFilletAPI import BRepFilletAPI_MakeFillet
+from OCP.BRepOffsetAPI import BRepOffsetAPI_ThruSections
+from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
+from OCP.collections import HArray1_gp_Pnt
+from OCP.GeomAPI import GeomAPI_Interpolate
+from OCP.gp import gp_Pnt
+from OCP.TopAbs import TopAbs_ShapeEnum
+from OCP.TopoDS import TopoDS
+from oracles_cad_damage import SIZES, parts_of
+
+
+def filleted_box(radius: float = 1.0):
+    """Six planes, twelve cylinders, eight spheres, every edge smooth."""
+    box = BRepPrimAPI_MakeBox(*SIZES).Shape()
+    fillet = BRepFilletAPI_MakeFillet(box)
+    for edge in parts_of(box, TopAbs_ShapeEnum.TopAbs_EDGE):
+        fillet.Add(radius, TopoDS.Edge(edge))
+    return fillet.Shape()
+
+
+def airfoil(chord: float, twist: float, at: np.ndarray, thickness: float = 0.12) -> np.ndarray:
+    """(41, 3) a NACA four-digit profile from the upper trailing edge round the nose; blunt, y constant."""
+    x = 0.5 * (1.0 + np.cos(np.linspace(0.0, 2.0 * np.pi, 41)))
+    half = 5 * thickness * (0.2969 * np.sqrt(x) - 0.126 * x - 0.3516 * x**2 + 0.2843 * x**3 - 0.1015 * x**4)
+    z = np.where(np.arange(41) <= 20, half, -half) + 0.04 * 4.0 * x * (1.0 - x)
+    c, s = np.cos(twist), np.sin(twist)
+    return at + chord * np.stack([c * x + s * z, np.zeros_like(x), c * z - s * x], axis=1)
+
+
+def lofted_wing():
+    """A solid of one skin, a blunt trailing edge and two flat ends."""
+    loft = BRepOffsetAPI_ThruSections(True, False, 1e-6)
+    for share in (0.0, 0.5, 1.0):
+        points = airfoil(1.0 - 0.5 * share, 0.05 * share, np.array([0.4 * share, 3.0 * share, 0.1 * share**2]))
+        stored = HArray1_gp_Pnt(1, len(points))
+        for k, point in enumerate(points.tolist()):
+            stored.SetValue(k + 1, gp_Pnt(*point))
+        spline = GeomAPI_Interpolate(stored, False, 1e-9)
+        spline.Perform()
+        first, last = gp_Pnt(*points[0].tolist()), gp_Pnt(*points[-1].tolist())
+        wire = BRepBuilderAPI_MakeWire(BRepBuilderAPI_MakeEdge(spline.Curve()).Edge())
+        wire.Add(BRepBuilderAPI_MakeEdge(last, first).Edge())
+        loft.AddWire(wire.Wire())
+    loft.Build()
+    return loft.Shape()
