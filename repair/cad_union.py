@@ -7,6 +7,7 @@ number); and everything of the bodies that lies outside the others is there.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -38,7 +39,8 @@ MANY = 40  # bodies united in one go
 class Union:
     """A model whose overlapping bodies are one, and what was done; `made` is False where they are as they came.
 
-    `cut` are the faces that were cut, `origin` (f,) is the face each one was before.
+    `cut` are the faces that were cut, `origin` (f,) is the face each one was before, `shells` are the bodies that were
+    united and `depth` how near to one its triangles tell nothing.
     """
 
     model: Assembly
@@ -46,6 +48,12 @@ class Union:
     cut: frozenset[int] = frozenset()
     entries: tuple[LedgerEntry, ...] = ()
     made: bool = False
+    shells: tuple[Triangulation, ...] = ()
+    depth: float = 0.0
+
+    def hidden(self, points: Array) -> BoolArray:
+        """(n,) points inside a body that was united: the surface there is gone."""
+        return _enclosed(points, self.shells, -1, self.depth)
 
     def labelled(self, faces: tuple[Face, ...], before: tuple[Face, ...] = ()) -> tuple[Face, ...]:
         """The faces, the kept ones among them with the rung that cut them, or that they had `before`."""
@@ -98,22 +106,27 @@ def _refuted(model: Assembly, bodies: list[list[int]], made: United) -> str:
     of_body = np.full(len(model.parts), -1)
     for number, body in enumerate(bodies):
         of_body[body] = number
-    sag = SAG * max(1e-9 * model.diagonal, sags(model, 100.0).max(), sags(made.assembly, 100.0).max())
+    depth = _depth(model, made)
     for number, shell in enumerate(shells):
         kept = np.flatnonzero(of_body[made.origin] == number).tolist()
         if kept:
             points, _ = sample_area(shell_of(made.assembly, kept), SAMPLES)
-            wrong = _enclosed(points, shells, number, sag)
+            wrong = _enclosed(points, shells, number, depth)
             if wrong.any():
                 return f"{wrong.mean():.1%} of what the kernel kept of body {number + 1} lies inside another body"
         points, _ = sample_area(shell, SAMPLES)
-        lost = ~_enclosed(points, shells, number, -sag) & (result.closest(points).distance > sag)
+        lost = ~_enclosed(points, shells, number, -depth) & (result.closest(points).distance > depth)
         if lost.any():
             return f"{lost.mean():.1%} of body {number + 1} lies outside the others and is gone"
     return ""
 
 
-def _enclosed(points: Array, shells: list[Triangulation], number: int, depth: float) -> BoolArray:
+def _depth(model: Assembly, made: United) -> float:
+    """Nearer to a tessellation than this a point is on it, as far as can be told."""
+    return float(SAG * max(1e-9 * model.diagonal, sags(model, 100.0).max(), sags(made.assembly, 100.0).max()))
+
+
+def _enclosed(points: Array, shells: Sequence[Triangulation], number: int, depth: float) -> BoolArray:
     """Which points of a body lie inside another one, deeper than `depth`, or, where it is negative, or so near."""
     out = np.zeros(len(points), dtype=bool)
     for other, shell in enumerate(shells):
@@ -145,7 +158,8 @@ def _told(model: Assembly, bodies: list[list[int]], made: United, names: tuple[s
             size=size,
         )
     )  # fmt: skip
-    return Union(made.assembly, made.origin, cut, tuple(entries), made=True)
+    shells = tuple(shell_of(model, body) for body in bodies)
+    return Union(made.assembly, made.origin, cut, tuple(entries), True, shells, _depth(model, made))
 
 
 def _left(model: Assembly, bodies: list[list[int]], names: tuple[str, ...], why: str) -> LedgerEntry:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -89,6 +90,7 @@ def two_sided(
     skip_before: BoolArray | None = None,
     skip_after: BoolArray | None = None,
     before_tree: Tree | None = None,
+    hidden: Callable[[Array], BoolArray] | None = None,
 ) -> Deviation:
     """Distances between two triangulations.
 
@@ -96,11 +98,15 @@ def two_sided(
     ----------
     tolerance : the length coverage is counted against, or one for each triangle of both
     skip_before, skip_after : (m,) bool, triangles no distance is taken *from* (invented surface)
+    hidden : tells which points (n, 3) of `before` no distance is taken from (what was meant to go)
     """
 
     def one_way(source: Triangulation, skip: BoolArray | None, tree: Tree, side: int) -> Spread:
         kept = np.ones(len(source), dtype=bool) if skip is None else ~np.asarray(skip, dtype=bool)
         points, triangle = sample_area(source.take(kept), SAMPLES)
+        if hidden is not None and side == 0:
+            seen = ~hidden(points)
+            points, triangle = points[seen], triangle[seen]
         own = sampled_limits(tolerance, side, kept, triangle)
         return spread(points, tree.closest(points).distance if len(points) else np.zeros(0), own)
 
