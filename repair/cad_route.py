@@ -106,8 +106,8 @@ def repair_cad(
         model.triangulation,
         body,
         tolerance.fit,
-        skip_before=union.hidden(model.triangulation),
         skip_after=None if body.tags is None else made_up[body.tags],
+        hidden=union.hidden,
     )
     untouched = outcome.sewn is None and not outcome.changes and not copies and not union.made
     verdict = Verdict.CLEAN if untouched else Verdict.REPAIRED
@@ -154,8 +154,7 @@ def _continued(
     ledger = (*ledger, *again.ledger)
     if again.deviation is None:
         return replace(again, ledger=ledger)
-    hidden = late.hidden(model.triangulation)
-    deviation = two_sided(model.triangulation, again.triangulation, tolerance.fit, skip_before=hidden)
+    deviation = two_sided(model.triangulation, again.triangulation, tolerance.fit, hidden=late.hidden)
     verdict = Verdict.REPAIRED if again.verdict is Verdict.CLEAN else again.verdict
     areas = np.array([part.triangulation.areas.sum() for part in outcome.assembly.parts])
     faces = late.labelled(again.faces, _faces(outcome, areas))
