@@ -10,14 +10,13 @@ from patchwright.repair.mended import Action, Problem, Work, middle
 from patchwright.repair.near_copies import near_copies
 from patchwright.repair.orient import orient
 from patchwright.repair.weld import (
-    WIDE_SPREAD,
     Copies,
     contract_short,
     reach_of,
     scatter_beyond,
-    torn,
     weld,
     weld_distance,
+    weld_shown,
 )
 
 SHATTERED = 0.5  # of the triangles alone: there is no surface whose gaps could be bridged
@@ -29,13 +28,7 @@ def weld_copies(work: Work) -> None:
     work.now, doubled = near_copies(work.now, distance)
     if len(doubled):
         copies = Copies.of(work.now, reach_of(work.tolerance))
-    welded = weld(work.now, distance, copies)
-    apart = distance
-    if torn(copies, welded.triangulation, distance, work.tolerance):
-        apart = WIDE_SPREAD * distance
-        if apart <= 2.0 * work.tolerance.fit:
-            welded = weld(work.now, distance, copies, WIDE_SPREAD)
-    failed = apart > distance and torn(copies, welded.triangulation, distance, work.tolerance)
+    welded, apart = weld_shown(work.now, distance, copies, work.tolerance)
     del copies
     work.noise, work.distance = welded.noise, distance
     work.now = welded.triangulation
@@ -47,7 +40,7 @@ def weld_copies(work: Work) -> None:
             )
         )  # fmt: skip
 
-    if failed:
+    if apart is not None:
         _tell_scatter(work, apart)
     elif distance > work.tolerance.gap:
         _below_noise(work, distance)

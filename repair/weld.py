@@ -240,6 +240,24 @@ def weld_distance(
     )
 
 
+def weld_shown(
+    triangulation: Triangulation, distance: float, copies: Copies, tolerance: Tolerance
+) -> tuple[Welded, float | None]:
+    """Weld at the distance that the data shows (`weld_distance`), once more where the copies stand in rings.
+
+    Returns
+    -------
+    The weld, and how far apart the copies are where that is more than the tolerance allows, else None.
+    """
+    welded = weld(triangulation, distance, copies)
+    if not torn(copies, welded.triangulation, distance, tolerance):
+        return welded, None
+    if WIDE_SPREAD * distance <= 2.0 * tolerance.fit:
+        welded = weld(triangulation, distance, copies, WIDE_SPREAD)
+    failed = torn(copies, welded.triangulation, distance, tolerance)
+    return welded, WIDE_SPREAD * distance if failed else None
+
+
 def torn(copies: Copies, welded: Triangulation, distance: float, tolerance: Tolerance) -> bool:
     """Whether a weld joined less than half of the edges that lie within the distance: the copies spread too far."""
     free = len(copies.free.start)

@@ -83,10 +83,12 @@ class Examination:
     @cached_property
     def welded(self) -> Triangulation:
         """Copies of one point merged."""
-        from patchwright.repair.weld import weld
+        from patchwright.repair.weld import weld_shown
 
         distance = self.weld_distance[0]
-        return weld(self.raw, distance, self.copies).triangulation if distance > 0.0 else self.merged
+        if distance <= 0.0:
+            return self.merged
+        return weld_shown(self.raw, distance, self.copies, self.tolerance)[0].triangulation
 
     @cached_property
     def collapsed(self) -> BoolArray:
