@@ -40,3 +40,21 @@ def test_what_is_new_and_what_is_gone() -> None:
     new, gone = sorted(regions(tagged(cube=cube), tagged(ball=ball), Tolerance(1e-9, 1e-4)), key=lambda r: r.name)
     assert (new.name, new.input_to_output, new.area) == ("ball", None, 0.0)
     assert (gone.name, gone.output_to_input) == ("cube", None)
+
+
+def test_what_lies_inside_another_part_is_not_missed() -> None:
+    cube, ball = box(), Triangulation(0.25 * sphere(32).vertices + np.array([1.0, 0.5, 0.5]), sphere(32).triangles)
+    both, limits = tagged(cube=cube, ball=ball), Tolerance(1e-9, 1e-4)
+    outside = ball.corners.mean(axis=1)[:, 0] > 1.0
+    united = tagged(cube=cube, ball=ball.take(outside).compact())
+    found = {r.name: r for r in regions(both, united, limits)}
+    assert found["ball"].enclosed == pytest.approx(0.5, abs=0.02)
+    assert found["ball"].input_to_output is not None
+    assert found["ball"].input_to_output.largest <= 1e-4 + 0.25 * np.pi / 32, "but for triangles across the border"
+    assert found["cube"].enclosed == 0.0
+    # a part that bulges out of the input is no enclosed part
+    grown = tagged(cube=Triangulation(1.1 * cube.vertices - 0.05, cube.triangles))
+    (bulged,) = regions(tagged(cube=cube), grown, limits)
+    assert bulged.enclosed == 0.0
+    assert bulged.input_to_output is not None
+    assert bulged.input_to_output.largest == pytest.approx(0.05, rel=1e-6)
