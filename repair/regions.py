@@ -21,7 +21,8 @@ class Region:
     """One named part: its area and both distances, invented surface included in the latter.
 
     `enclosed` is the share of it that lies inside other parts and is gone from the output, as it should; no distance is
-    taken from there. A part that is only in the output has no `input_to_output`, one that is gone no `output_to_input`.
+    taken from there. A part that is only in the output, or enclosed altogether, has no `input_to_output`, one that is
+    gone no `output_to_input`.
     """
 
     name: str
@@ -42,7 +43,7 @@ def regions(before: Triangulation, after: Triangulation, limits: Tolerance) -> t
     there, enclosed = _seen(before, after, limits)
     back = _by_name(after, *_distances(after, before)[:3])
     areas = _areas(before)
-    names = sorted({*there, *back}, key=lambda name: -areas.get(name, 0.0))[:MOST]
+    names = sorted({*there, *back, *enclosed}, key=lambda name: -areas.get(name, 0.0))[:MOST]
     own = dict(limits.parts)
 
     def figures(found: dict[str, tuple[Array, Array]], name: str) -> Spread | None:

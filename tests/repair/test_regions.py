@@ -58,3 +58,10 @@ def test_what_lies_inside_another_part_is_not_missed() -> None:
     assert bulged.enclosed == 0.0
     assert bulged.input_to_output is not None
     assert bulged.input_to_output.largest == pytest.approx(0.05, rel=1e-6)
+
+
+def test_a_part_inside_another_is_enclosed_altogether() -> None:
+    cube, ball = box(), Triangulation(0.25 * sphere(16).vertices + 0.5, sphere(16).triangles)
+    found = {r.name: r for r in regions(tagged(cube=cube, ball=ball), tagged(cube=cube), Tolerance(1e-9, 1e-4))}
+    assert found["ball"].enclosed == 1.0
+    assert (found["ball"].input_to_output, found["ball"].output_to_input) == (None, None)
