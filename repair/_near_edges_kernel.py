@@ -74,8 +74,9 @@ def _pairs_within(
     while 64 * blocks < n:
         blocks *= 2
     offsets = np.zeros(64 * blocks + 2, dtype=np.int32)
-    items = np.empty(_count(level, middle, present, offsets), dtype=np.int32)
-    _place(level, middle, present, offsets, items)
+    slots = np.empty((n, 2), dtype=np.int32)
+    items = np.empty(_count(level, middle, present, offsets, slots), dtype=np.int32)
+    _place(slots, offsets, items)
     begin = np.zeros(n + 1, dtype=np.int64)
     partner, gaps, kinds = np.empty(CANDIDATES, dtype=np.int64), np.empty(CANDIDATES), np.empty(CANDIDATES, np.int64)
     room, done = n + 64, 0
@@ -133,8 +134,8 @@ def _slot(level: int, i: int, j: int, k: int, blocks: int) -> int:
 
 
 @filling
-def _count(level: IntArray, middle: Array, present: BoolArray, offsets: Indices) -> int:
-    """Count the edges of each slot, two places ahead; returns the sum.
+def _count(level: IntArray, middle: Array, present: BoolArray, offsets: Indices, slots: Indices) -> int:
+    """Note the slots of each edge, -1 for none, and count the edges of each slot, two places ahead; returns the sum.
 
     Every edge lies in the grid of its own level and in the next finer one, where a shorter partner looks for it.
     """
@@ -143,13 +144,16 @@ def _count(level: IntArray, middle: Array, present: BoolArray, offsets: Indices)
     for e in range(len(level)):
         for finer in range(2):
             own = level[e] - finer
+            slots[e, finer] = -1
             if level[e] == _NOWHERE or not present[own + _LEVELS // 2]:
                 continue
             size = 2.0 ** (own + 1)
             i = int(np.floor(middle[e, 0] / size))
             j = int(np.floor(middle[e, 1] / size))
             k = int(np.floor(middle[e, 2] / size))
-            offsets[_slot(own, i, j, k, blocks) + 2] += 1
+            s = _slot(own, i, j, k, blocks)
+            slots[e, finer] = s
+            offsets[s + 2] += 1
             total += 1
     for s in range(len(offsets) - 2):
         offsets[s + 2] += offsets[s + 1]
@@ -157,21 +161,14 @@ def _count(level: IntArray, middle: Array, present: BoolArray, offsets: Indices)
 
 
 @filling
-def _place(level: IntArray, middle: Array, present: BoolArray, offsets: Indices, items: Indices) -> None:
+def _place(slots: Indices, offsets: Indices, items: Indices) -> None:
     """Put the edges into their slots: those of slot s are items[offsets[s]:offsets[s + 1]] then."""
-    blocks = (len(offsets) - 2) >> 6
-    for e in range(len(level)):
+    for e in range(len(slots)):
         for finer in range(2):
-            own = level[e] - finer
-            if level[e] == _NOWHERE or not present[own + _LEVELS // 2]:
-                continue
-            size = 2.0 ** (own + 1)
-            i = int(np.floor(middle[e, 0] / size))
-            j = int(np.floor(middle[e, 1] / size))
-            k = int(np.floor(middle[e, 2] / size))
-            s = _slot(own, i, j, k, blocks) + 1
-            items[offsets[s]] = e
-            offsets[s] += 1
+            s = slots[e, finer]
+            if s >= 0:
+                items[offsets[s + 1]] = e
+                offsets[s + 1] += 1
 
 
 @inner
@@ -247,12 +244,19 @@ def _search(
             continue
         found = 0
         size = 2.0 ** (level[e] + 1)
-        i0 = int(np.floor(middle[e, 0] / size - 0.5))
-        j0 = int(np.floor(middle[e, 1] / size - 0.5))
-        k0 = int(np.floor(middle[e, 2] / size - 0.5))
         limit = reach[e]
+        round_it = 1.0001 * limit  # what is in reach lies in one or two cells along each axis
+        i0 = int(np.floor((middle[e, 0] - round_it) / size))
+        j0 = int(np.floor((middle[e, 1] - round_it) / size))
+        k0 = int(np.floor((middle[e, 2] - round_it) / size))
+        more_i = int(np.floor((middle[e, 0] + round_it) / size)) - i0
+        more_j = int(np.floor((middle[e, 1] + round_it) / size)) - j0
+        more_k = int(np.floor((middle[e, 2] + round_it) / size)) - k0
         for corner in range(8):
-            s = _slot(level[e], i0 + (corner & 1), j0 + ((corner >> 1) & 1), k0 + (corner >> 2), blocks)
+            i, j, k = corner & 1, (corner >> 1) & 1, corner >> 2
+            if i > more_i or j > more_j or k > more_k:
+                continue
+            s = _slot(level[e], i0 + i, j0 + j, k0 + k, blocks)
             for at in range(offsets[s], offsets[s + 1]):
                 f = items[at]
                 # middles are no farther apart than the farther pair of ends; the factor is for rounding

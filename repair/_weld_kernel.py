@@ -4,11 +4,14 @@
 from __future__ import annotations
 
 import numpy as np
+import numpy.typing as npt
 
 from patchwright.models._compile_kernel import filling, inner
 from patchwright.models.arrays import Array, BoolArray, IntArray
 
 _SAME_WAY = 4  # the bit of a pair's kind, see `_near_edges_kernel`
+
+Indices = npt.NDArray[np.int32]
 
 
 @inner
@@ -24,7 +27,7 @@ def _mix(h: int) -> int:
 def merge_exact(bits: IntArray) -> IntArray:
     """(n,) index of the first row with the same three 64-bit words, of (n, 3) `bits`."""
     first = np.empty(len(bits), dtype=np.int64)
-    _merge_exact(bits, np.full(_slots(len(bits)), -1, dtype=np.int64), first)
+    _merge_exact(bits, np.full(_slots(len(bits)), -1, dtype=np.int32), first)
     return first
 
 
@@ -37,7 +40,7 @@ def _slots(n: int) -> int:
 
 
 @filling
-def _merge_exact(bits: IntArray, table: IntArray, first: IntArray) -> None:
+def _merge_exact(bits: IntArray, table: Indices, first: IntArray) -> None:
     size = len(table)
     for i in range(len(bits)):
         slot = _mix(_mix(_mix(bits[i, 0]) ^ bits[i, 1]) ^ bits[i, 2]) & (size - 1)
@@ -51,6 +54,74 @@ def _merge_exact(bits: IntArray, table: IntArray, first: IntArray) -> None:
                 first[i] = other
                 break
             slot = (slot + 1) & (size - 1)
+
+
+def mean_places(
+    points: Array, triangles: IntArray, clusters: IntArray, apart: BoolArray, place: Array
+) -> tuple[int, float, float, float]:
+    """Put clusters of vertices at the means of their corners.
+
+    Parameters
+    ----------
+    points, triangles : (n, 3) and (m, 3); a vertex weighs as much as it has triangles
+    clusters : (n,) the cluster of each vertex, 0..k-1
+    apart : (n,) vertices that are not where the first of their cluster is: clusters without such stay where they are
+    place : (k, 3) the first vertex of each, moved to the mean
+
+    Returns
+    -------
+    How many vertices in use moved, the farthest move, the sum of squared moves by weight, its degrees of freedom.
+    """
+    uses = np.zeros(len(points), dtype=np.int32)
+    busy = np.zeros(len(place), dtype=np.bool_)
+    result = np.zeros(3)
+    moved = _mean_places(points, triangles, clusters, apart, place, uses, busy, np.zeros((len(place), 4)), result)
+    return moved, float(result[0]), float(result[1]), float(result[2])
+
+
+@filling
+def _mean_places(
+    points: Array,
+    triangles: IntArray,
+    clusters: IntArray,
+    apart: BoolArray,
+    place: Array,
+    uses: Indices,
+    busy: BoolArray,
+    sums: Array,
+    result: Array,
+) -> int:
+    for t in range(len(triangles)):
+        for k in range(3):
+            uses[triangles[t, k]] += 1
+    for i in range(len(points)):
+        if apart[i] and uses[i] > 0:
+            busy[clusters[i]] = True
+    for i in range(len(points)):
+        c = clusters[i]
+        if busy[c] and uses[i] > 0:
+            sums[c, 3] += uses[i]
+            for d in range(3):
+                sums[c, d] += uses[i] * (points[i, d] - place[c, d])
+    for c in range(len(place)):
+        if busy[c]:
+            result[2] += sums[c, 3] - 1.0
+            for d in range(3):
+                place[c, d] += sums[c, d] / sums[c, 3]
+    moved = 0
+    for i in range(len(points)):
+        if uses[i] == 0:
+            continue
+        c = clusters[i]
+        square = 0.0
+        for d in range(3):
+            square += (place[c, d] - points[i, d]) * (place[c, d] - points[i, d])
+        if square > 0.0:
+            moved += 1
+        if busy[c]:
+            result[1] += uses[i] * square
+        result[0] = max(result[0], np.sqrt(square))
+    return moved
 
 
 @inner

@@ -286,34 +286,21 @@ def scatter_beyond(triangulation: Triangulation, tolerance: Tolerance) -> float 
 
 def _merge(triangulation: Triangulation, first: IntArray, root: IntArray) -> Welded:
     """Put each cluster at the mean of its corners; `first` are the exact copies, which alone move nothing."""
+    from patchwright.repair._weld_kernel import mean_places
+
     points = triangulation.vertices
-    used = np.zeros(len(first), dtype=np.bool_)
-    used[triangulation.triangles] = True
     lead = np.zeros(len(root), dtype=np.bool_)
     lead[root] = True
     kept = np.flatnonzero(lead)
     clusters = (np.cumsum(lead) - 1)[root]
-    place = points[kept].copy()
-    # only clusters of different coordinates get a new place: the mean over the corners in use
-    inner = used & (root != first)
-    busy = np.zeros(len(kept), dtype=np.bool_)
-    busy[clusters[inner]] = True
-    members = used & busy[clusters]
-    uses = np.bincount(triangulation.triangles.reshape(-1), minlength=len(points)).astype(np.float64)
-    weight = np.where(members, uses, 0.0)
-    total = np.bincount(clusters, weights=weight, minlength=len(kept))
-    for axis in range(3):
-        mean = np.bincount(clusters, weights=weight * (points[:, axis] - place[clusters, axis]), minlength=len(kept))
-        place[:, axis] += np.divide(mean, total, out=np.zeros(len(kept)), where=busy & (total > 0.0))
-    move = np.linalg.norm(place[clusters] - points, axis=1)
-    scatter = float(np.sum(weight[members] * move[members] ** 2))
-    freedom = float(total[busy].sum() - busy.sum())
+    place = points[kept]
+    moved, largest, scatter, freedom = mean_places(points, triangulation.triangles, clusters, root != first, place)
     return Welded(
         replace(triangulation, vertices=place, triangles=clusters[triangulation.triangles]),
         clusters,
         int(len(points) - len(kept)),
-        int(np.count_nonzero(move[used] > 0.0)),
-        float(move[used].max(initial=0.0)),
+        moved,
+        largest,
         float(np.sqrt(scatter / freedom)) if freedom > 0.0 else 0.0,
     )
 
