@@ -22,7 +22,6 @@ from patchwright.repair._surface_walk_kernel import inner, walk
 
 _SOFT = 0.1  # corners much better than this hardly count beside poor ones
 _SLENDER = 4.0  # quads as many times longer than wide are as good as square ones
-_UNPAIRED = 0.55  # score of two triangles left alone: they become six quads as good as those of a pair of this score
 
 
 @njit(cache=True, nogil=True, error_model="numpy", _nrt=False, no_cfunc_wrapper=True)
@@ -39,8 +38,11 @@ def curve_sides_of_edges(m, g, count, arcs):
 
 
 @njit(cache=True, nogil=True, error_model="numpy", no_cfunc_wrapper=True)
-def match(neighbours, score, order):
-    """(m,) partner side of each triangle or -1: greedily by score, then by swaps that raise the sum."""
+def match(neighbours, score, order, unpaired):
+    """(m,) partner side of each triangle or -1: greedily by score, then by swaps that raise the sum.
+
+    `unpaired` is what two triangles left alone count in that sum.
+    """
     m = len(neighbours)
     partner = np.full(m, -1, dtype=np.int64)
     for flat in order:
@@ -62,7 +64,7 @@ def match(neighbours, score, order):
                 if x < 0 or score[u, k] <= 0.0:
                     continue
                 if partner[x] < 0:
-                    gain = score[u, k] - _UNPAIRED
+                    gain = score[u, k] - unpaired
                     if gain > best:
                         best, bk, by, bz = gain, k, -1, -1
                     continue
@@ -74,7 +76,7 @@ def match(neighbours, score, order):
                 for j in range(3):
                     z = neighbours[y, j]
                     if z >= 0 and z != u and z != x and partner[z] < 0 and score[y, j] > 0.0:
-                        gain = score[u, k] + score[y, j] - loss - _UNPAIRED
+                        gain = score[u, k] + score[y, j] - loss - unpaired
                         if gain > best:
                             best, bk, by, bz = gain, k, y, j
             if bk < 0:

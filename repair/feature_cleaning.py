@@ -13,6 +13,7 @@ from patchwright.models.triangulation import Triangulation
 CORNER_TURN = 40.0  # degrees a feature line turns at a corner
 SPECK_SHARE = 0.01  # of the diagonal: a shorter line with a loose end fades away and is let go
 SPECK_EDGES = 5  # a ring as short is noise when it has fewer edges or is shorter than half of that
+FACET_BORDER = 0.04  # of the diagonal: a triangle on its own, shorter round, is a facet and no piece between lines
 ROUNDS = 4  # of cutting teeth and joining specks: what is left after that is no chain of slivers
 
 
@@ -149,7 +150,10 @@ def merge_specks(
     for _ in range(ROUNDS):
         region = kernel.regions(neighbours, np.where((sharp | firm)[sides], 0, -1))
         area = np.bincount(region, weights=body.areas)
-        small = (area < least)[region]
+        t, k = np.nonzero((sharp | firm)[sides])
+        border = np.bincount(region[t], weights=length[sides[t, k]], minlength=len(area))
+        facet = (np.bincount(region) == 1) & (border < FACET_BORDER * body.diagonal)
+        small = ((area < least) | facet)[region]
         t, k = np.nonzero(small[:, None] & (neighbours >= 0) & (sharp & ~firm)[sides])
         other = neighbours[t, k]
         # a small piece goes to a larger one, so that two do not swap

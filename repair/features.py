@@ -131,7 +131,7 @@ def find_features(triangulation: Triangulation, *, angle: float = 30.0, frozen: 
     kind = np.where(free, BOUNDARY, np.where(sharp, SHARP, np.where(follow, FOLLOWED, 0)))
     on_curve = np.zeros(len(points), dtype=bool)
     on_curve[edges[kind > 0]] = True
-    tips = find_tips(body, normals, on_curve, angle)
+    tips = find_tips(body, normals, on_curve, angle, max(width, SPECK * body.diagonal))
     return _chains(body, neighbours, normals, noise, edges, sides, kind, first, second, width, tips)
 
 

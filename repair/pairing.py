@@ -15,6 +15,8 @@ from patchwright.models.arrays import Array, IntArray
 from patchwright.repair.remesh import CoarseMesh
 
 ACCEPTABLE = 0.25  # score below which two triangles are not joined
+BORNE = 0.02  # the same where few quads shall come out: a triangle left alone costs two more
+UNPAIRED = 0.55  # score of two triangles left alone: they become six quads as good as those of a pair of this score
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,8 +48,8 @@ class QuadMesh:
         return replace(self, mesh=mesh._replace(**columns), outward=self.outward.copy())
 
 
-def pair_score(coarse: CoarseMesh) -> Array:
-    """(m, 3) how near to a rectangle a triangle and its neighbour across side k are, in [0, 1]; 0 when not allowed.
+def pair_score(coarse: CoarseMesh, least: float = ACCEPTABLE) -> Array:
+    """(m, 3) how near to a rectangle a triangle and its neighbour across side k are, in [0, 1]; 0 below `least`.
 
     1 - the largest difference of a corner from 90 degrees over 90, times the cosine between the triangles.
     """
@@ -73,7 +75,7 @@ def pair_score(coarse: CoarseMesh) -> Array:
     flat = np.einsum("ij,ij->i", normals[t], normals[o])
     value = np.clip(1.0 - np.abs(angle - 90.0).max(axis=1) / 90.0, 0.0, 1.0) * np.clip(flat, 0.0, 1.0)
     score = np.zeros(mesh.T.shape)
-    score[t, k] = np.where(value >= ACCEPTABLE, value, 0.0)
+    score[t, k] = np.where(value >= least, value, 0.0)
     return score
 
 
@@ -99,16 +101,21 @@ def part_doublets(mesh: Any, score: Array, partner: IntArray) -> None:
         partner[t[worst]] = -1
 
 
-def pair(coarse: CoarseMesh) -> QuadMesh:
-    """Quads only, on the surface and along the features."""
+def pair(coarse: CoarseMesh, *, few: bool = False) -> QuadMesh:
+    """Quads only, on the surface and along the features.
+
+    With `few`, only those edges are halved that must be (`halving`); otherwise all.
+    """
     from patchwright.repair import _quad_kernel as kernel
     from patchwright.repair import _remesh_kernel as records
+    from patchwright.repair.halving import halved
 
     mesh, ground = coarse.mesh, coarse.ground
     triangles, neighbours = mesh.T, mesh.B
     m, n = len(triangles), len(mesh.X)
-    score = pair_score(coarse)
-    partner = kernel.match(neighbours, score, np.argsort(-score.reshape(-1), kind="stable"))
+    score = pair_score(coarse, BORNE if few else ACCEPTABLE)
+    order = np.argsort(-score.reshape(-1), kind="stable")
+    partner = kernel.match(neighbours, score, order, BORNE if few else UNPAIRED)
     part_doublets(mesh, score, partner)
     arcs = np.zeros((m, 3, 2))
     kernel.curve_sides_of_edges(mesh, ground, m, arcs)
@@ -142,33 +149,54 @@ def pair(coarse: CoarseMesh) -> QuadMesh:
     edge_normal = normals[st].copy()
     inner = neighbours[st, sk] >= 0
     edge_normal[inner] += normals[neighbours[st, sk][inner]]
-    e, f = len(kept), len(faces)
-    parents = np.full((e + f, 4), -1, dtype=np.int64)
-    parents[:e, :2] = ends
-    parents[e:] = faces
-    regions = np.concatenate([mesh.R[st], mesh.R[leader]])
+    e = len(kept)
+    face_edges, edge_faces = _sides(faces, kept, n)
+    if few:
+        marks = halved(faces, face_edges, edge_faces, ends, mesh.X, face_normal, curve >= 0)
+    else:
+        marks = np.ones(e, dtype=bool)
+    halves = np.flatnonzero(marks)
+    middle = np.full(e + 1, -1)
+    middle[halves] = n + np.arange(len(halves))
+    quads, owner, centred = _split_faces(faces, np.where(face_edges >= 0, middle[face_edges], -1), n + len(halves))
+    h, f = len(halves), len(centred)
+    parents = np.full((h + f, 4), -1, dtype=np.int64)
+    parents[:h, :2] = ends[halves]
+    parents[h:] = faces[centred]
+    regions = np.concatenate([mesh.R[st[halves]], mesh.R[leader[centred]]])
     columns: Any = [
-        *[np.concatenate([v, np.zeros((e + f, *v.shape[1:]), dtype=v.dtype)]) for v in mesh[:8]],
+        *[np.concatenate([v, np.zeros((h + f, *v.shape[1:]), dtype=v.dtype)]) for v in mesh[:8]],
         *mesh[8:12],
-        np.zeros(n + e + f, dtype=np.int64),
+        np.zeros(n + h + f, dtype=np.int64),
     ]
     grown = records.Mesh._make(columns)
-    spot = np.zeros((e + f, 1, 3))
+    spot = np.zeros((h + f, 1, 3))
     for k4 in range(4):
         spot[:, 0] += np.where((parents[:, k4] >= 0)[:, None], grown.X[parents[:, k4]], 0.0)
     spot /= (parents >= 0).sum(axis=1)[:, None, None]
-    new_curve = np.concatenate([curve, np.full(f, -1)])
-    landed, at = np.empty_like(spot), np.empty((e + f, 1), dtype=np.int64)
-    kernel.land(grown, ground, parents, regions, spot, np.concatenate([edge_normal, face_normal]), landed, at)
+    arc = arcs[st, sk]
+    landed, at = np.empty_like(spot), np.empty((h + f, 1), dtype=np.int64)
+    towards = np.concatenate([edge_normal[halves], face_normal[centred]])
+    kernel.land(grown, ground, parents, regions, spot, towards, landed, at)
     at = np.where(at[:, 0] >= 0, at[:, 0], mesh.vt[parents[:, 0]])
-    kernel.place_new(grown, ground, n, new_curve, np.concatenate([arcs[st, sk], np.zeros((f, 2))]), landed[:, 0], at)
-    quads, owner = _split_faces(faces, kept, n, e)
-    # feature edges, each in two halves, in the curve's direction
+    new_curve, new_arc = (
+        np.concatenate([curve[halves], np.full(f, -1)]),
+        np.concatenate([arc[halves], np.zeros((f, 2))]),
+    )
+    kernel.place_new(grown, ground, n, new_curve, new_arc, landed[:, 0], at)
+    # feature edges, in the curve's direction, whole or in two halves
     on = np.flatnonzero(curve >= 0)
-    arc = arcs[st[on], sk[on]]
-    forth = arc[:, 0] < arc[:, 1]
+    forth = arc[on, 0] < arc[on, 1]
     begin, end = np.where(forth, ends[on, 0], ends[on, 1]), np.where(forth, ends[on, 1], ends[on, 0])
-    sides = np.concatenate([np.stack([begin, n + on], axis=1), np.stack([n + on, end], axis=1)])
+    cut, whole = marks[on], ~marks[on]
+    between = middle[on[cut]]
+    sides = np.concatenate(
+        [
+            np.stack([begin[cut], between], axis=1),
+            np.stack([between, end[cut]], axis=1),
+            np.stack([begin[whole], end[whole]], axis=1),
+        ]
+    )
     return QuadMesh(
         ground,
         grown,
@@ -176,20 +204,66 @@ def pair(coarse: CoarseMesh) -> QuadMesh:
         np.ascontiguousarray(mesh.R[leader][owner]),
         np.ascontiguousarray(face_normal[owner]),
         sides,
-        np.concatenate([curve[on], curve[on]]),
+        np.concatenate([curve[on[cut]], curve[on[cut]], curve[on[whole]]]),
     )
 
 
-def _split_faces(faces: IntArray, kept: IntArray, n: int, e: int) -> tuple[IntArray, IntArray]:
-    """One quad per face corner (corner, middle ahead, centre, middle behind), and the face of each."""
+def _sides(faces: IntArray, kept: IntArray, n: int) -> tuple[IntArray, IntArray]:
+    """(f, 4) the edge from each corner of a face to the next, -1 behind a triangle's; (e, 2) the faces of each edge."""
     corners = np.where(faces[:, 3] < 0, 3, 4)
-    owner = np.repeat(np.arange(len(faces)), corners)
-    local = np.arange(len(owner)) - np.repeat(np.cumsum(corners) - corners, corners)
-    here = faces[owner, local]
-    ahead = faces[owner, (local + 1) % corners[owner]]
-    behind = faces[owner, (local - 1) % corners[owner]]
+    ahead = np.take_along_axis(faces, (np.arange(4)[None, :] + 1) % corners[:, None], axis=1)
+    sides = np.searchsorted(kept, np.minimum(faces, ahead) * n + np.maximum(faces, ahead))
+    there = np.arange(4)[None, :] < corners[:, None]
+    sides = np.where(there, sides, -1)
+    flat, owner = sides[there], np.nonzero(there)[0]
+    order = np.argsort(flat, kind="stable")
+    first = np.searchsorted(flat[order], np.arange(len(kept) + 1))
+    both = np.full((len(kept), 2), -1, dtype=np.int64)
+    both[:, 0] = owner[order[first[:-1]]]
+    twice = np.diff(first) > 1
+    both[twice, 1] = owner[order[first[:-1][twice] + 1]]
+    return sides, both
 
-    def middle(p: IntArray, q: IntArray) -> IntArray:
-        return np.asarray(n + np.searchsorted(kept, np.minimum(p, q) * n + np.maximum(p, q)))
 
-    return np.stack([here, middle(here, ahead), n + e + owner, middle(behind, here)], axis=1), owner
+# what becomes of a quad (4 sides) or triangle (3) with its first sides halved so, as corners 0 to 3, middles 4 to 7 of
+# the sides from there on, and 8, the centre
+PIECES = {
+    (4, (0, 0, 0, 0)): ((0, 1, 2, 3),),
+    (4, (1, 0, 1, 0)): ((0, 4, 6, 3), (4, 1, 2, 6)),
+    (4, (1, 1, 0, 0)): ((4, 1, 5, 8), (8, 5, 2, 3), (4, 8, 3, 0)),
+    (4, (1, 1, 1, 1)): ((0, 4, 8, 7), (1, 5, 8, 4), (2, 6, 8, 5), (3, 7, 8, 6)),
+    (3, (1, 0, 0)): ((0, 4, 1, 2),),
+    (3, (1, 1, 1)): ((0, 4, 8, 6), (1, 5, 8, 4), (2, 6, 8, 5)),
+}
+
+
+def _split_faces(faces: IntArray, middles: IntArray, n: int) -> tuple[IntArray, IntArray, IntArray]:
+    """Quads, the face each is a piece of, and the faces that got a centre, numbered from `n` on.
+
+    `middles` (f, 4) are the vertices halfway along the sides, -1 where a side stays whole.
+    """
+    corners = np.where(faces[:, 3] < 0, 3, 4)
+    mark = middles >= 0
+    quads: list[IntArray] = []
+    owner: list[IntArray] = []
+    centred: list[IntArray] = []
+    for (count, pattern), pieces in PIECES.items():
+        turns = {tuple(np.roll(pattern, turn).tolist()): turn for turn in reversed(range(count))}
+        for turned, turn in turns.items():
+            some = np.flatnonzero((corners == count) & (mark[:, :count] == np.array(turned, dtype=bool)).all(axis=1))
+            if not len(some):
+                continue
+            way = (np.arange(count) + turn) % count
+            spots = np.full((len(some), 9), -1, dtype=np.int64)
+            spots[:, :count] = faces[some][:, way]
+            spots[:, 4 : 4 + count] = middles[some][:, way]
+            if 8 in np.array(pieces):
+                spots[:, 8] = n + sum(len(c) for c in centred) + np.arange(len(some))
+                centred.append(some)
+            for piece in pieces:
+                quads.append(spots[:, piece])
+                owner.append(some)
+    face = np.concatenate(owner)
+    order = np.argsort(face, kind="stable")
+    centres = np.concatenate([*centred, np.zeros(0, dtype=np.int64)])
+    return np.concatenate(quads)[order], face[order], centres

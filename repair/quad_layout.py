@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 METHODS = ("pairs", "quadriflow")
 RETRIES = 3
 NEAR_TARGET = 1.15  # number of quads against the wanted one
+CROWDED = 2.0  # the same, beyond which no more edges are halved than must be
+SPARSE = 1.5  # size of the coarse triangles then, in wanted sizes of quads: two of them make one or two quads
 
 
 @dataclass(frozen=True, slots=True)
@@ -176,31 +178,46 @@ def _with_ridges(features: Features, angle: float) -> tuple[Features, Ridges | N
 
 
 def _pairs(features: Features, ridges: Ridges | None, target: int | None) -> QuadMesh:
-    """Coarse triangles paired, split and made regular; once more with corrected sizes where their number is off."""
+    """Coarse triangles paired, split and made regular; once more with corrected sizes where their number is off.
+
+    Where features make too many quads of that whatever the size, smaller triangles are paired and split as little as
+    can be.
+    """
     from patchwright.repair.pairing import pair
-    from patchwright.repair.quad_smooth import smooth
     from patchwright.repair.regular import regularize, unfolded
     from patchwright.repair.remesh import remesh
     from patchwright.repair.sizing import size_field
 
     factor, best, error = 1.0, None, np.inf
-    for _ in range(RETRIES):
+    for turn in range(RETRIES):
         size, wanted = size_field(features, ridges, target=target, factor=factor)
         paired = pair(remesh(features, 2.0 * size))
-        quad_mesh = regularize(unfolded(paired))
+        forced = target is None or (turn == RETRIES - 1 and error > np.log(CROWDED))  # larger triangles did not do
+        if forced and len(paired.quads) > CROWDED * wanted:
+            paired = pair(remesh(features, SPARSE * size), few=True)
+        begun, smoothed = unfolded(paired)
+        quad_mesh = regularize(begun)
         ratio = len(quad_mesh.quads) / wanted
         if abs(np.log(ratio)) < error:
-            best, error = (quad_mesh, paired), abs(np.log(ratio))
+            best, error = (quad_mesh, paired, smoothed), abs(np.log(ratio))
         if target is None or error < np.log(NEAR_TARGET):
             break
         factor *= np.sqrt(ratio)
     assert best is not None
-    regular, paired = best
+    return _settled(*best)
+
+
+def _settled(regular: QuadMesh, paired: QuadMesh, smoothed: QuadMesh | None) -> QuadMesh:
+    """The regular quads smoothed, or those they were made of where fewer of these are folded."""
+    from patchwright.repair.quad_smooth import smooth
+
     smooth(regular)
     if not _folded(regular):
         return regular
-    smooth(paired)  # never more folds than the quads as they were paired
-    return min((regular, paired), key=_folded)
+    if smoothed is None:
+        smooth(paired)
+        smoothed = paired
+    return min((regular, smoothed), key=_folded)
 
 
 def _folded(quad_mesh: QuadMesh) -> int:

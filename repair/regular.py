@@ -154,13 +154,16 @@ def _room(quads: int, vertices: int, limit: int) -> tuple[Any, Any]:
     return disc, scratch
 
 
-def unfolded(quad_mesh: QuadMesh) -> QuadMesh:
-    """The quads where those near folded ones are smoothed: a copy, or the quads themselves where none is folded."""
+def unfolded(quad_mesh: QuadMesh) -> tuple[QuadMesh, QuadMesh | None]:
+    """The quads where those near folded ones are smoothed, and the quads where all are.
+
+    The first are a copy, or the quads themselves where none is folded; then nothing has been smoothed: None.
+    """
     from patchwright.repair.quad_smooth import scaled_jacobians, smooth, update_outward
 
     near: BoolArray = scaled_jacobians(quad_mesh) <= 0.0
     if not near.any():
-        return quad_mesh
+        return quad_mesh, None
     own, smoothed = quad_mesh.copy(), quad_mesh.copy()
     smooth(smoothed)
     for _ in range(FOLD_RINGS):
@@ -171,4 +174,4 @@ def unfolded(quad_mesh: QuadMesh) -> QuadMesh:
     for mine, other in zip(own.mesh[:8], smoothed.mesh[:8], strict=True):
         mine[which] = other[which]
     update_outward(own.mesh, own.ground, own.quads, own.region, own.outward)
-    return own
+    return own, smoothed

@@ -8,7 +8,7 @@ from patchwright.models.arrays import Array, BoolArray
 from patchwright.models.triangulation import Triangulation
 
 
-def find_tips(body: Triangulation, normals: Array, on_curve: BoolArray, angle: float) -> BoolArray:
+def find_tips(body: Triangulation, normals: Array, on_curve: BoolArray, angle: float, reach: float = 0.0) -> BoolArray:
     """(n,) vertices off all curves round which no triangle faces the way their mean normal does.
 
     Parameters
@@ -17,6 +17,7 @@ def find_tips(body: Triangulation, normals: Array, on_curve: BoolArray, angle: f
     normals : (m, 3) unit normals freed from noise
     on_curve : (n,) vertices on feature curves
     angle : degrees; as much does every triangle round a tip lean away from the mean
+    reach : and so do all triangles whose middles are no farther from it; where one does not, the tip is a scratch
 
     The triangles count by their angles at the vertex. On a cone all lean by the complement of its half angle, so a cone
     blunter than the complement of `angle` has no tip.
@@ -31,4 +32,21 @@ def find_tips(body: Triangulation, normals: Array, on_curve: BoolArray, angle: f
     mean = np.divide(mean, size, out=np.zeros_like(mean), where=size > 0)
     most = np.full(len(mean), -1.0)
     np.maximum.at(most, flat, np.einsum("ij,ij->i", np.repeat(normals, 3, axis=0), mean[flat]))
-    return np.asarray((most < np.cos(np.radians(angle))) & ~on_curve & (size[:, 0] > 0.0))
+    tips = (most < np.cos(np.radians(angle))) & ~on_curve & (size[:, 0] > 0.0)
+    some = np.flatnonzero(tips)
+    if len(some):
+        tips[some] = _most_facing(body, normals, body.vertices[some], mean[some], reach) < np.cos(np.radians(angle))
+    return np.asarray(tips)
+
+
+def _most_facing(body: Triangulation, normals: Array, points: Array, directions: Array, reach: float) -> Array:
+    """(k,) largest cosine between each direction and the normals of triangles whose middles are near its point."""
+    from scipy.spatial import cKDTree
+
+    near = list(cKDTree(body.corners.mean(axis=1)).query_ball_point(points, reach))
+    count = np.array([len(own) for own in near])
+    triangles = np.concatenate([np.asarray(own, dtype=np.int64) for own in near])
+    owner = np.repeat(np.arange(len(points)), count)
+    most = np.full(len(points), -1.0)
+    np.maximum.at(most, owner, np.einsum("ij,ij->i", normals[triangles], directions[owner]))
+    return most

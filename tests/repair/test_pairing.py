@@ -10,7 +10,7 @@ from layout_shapes import cube, plate_with_hole, sphere, torus
 
 from patchwright.repair._quad_kernel import match
 from patchwright.repair.features import find_features
-from patchwright.repair.pairing import pair, pair_score, part_doublets
+from patchwright.repair.pairing import UNPAIRED, pair, pair_score, part_doublets
 from patchwright.repair.quad_smooth import scaled_jacobians, smooth
 from patchwright.repair.remesh import remesh
 
@@ -44,7 +44,7 @@ def test_an_unlucky_first_choice_is_repaired():
     # a row of four triangles: the middle pair scores best, but taking it leaves both ends alone
     neighbours = np.array([[1, -1, -1], [0, 2, -1], [1, 3, -1], [2, -1, -1]])
     score = np.array([[0.9, 0, 0], [0.9, 1.0, 0], [1.0, 0.9, 0], [0.9, 0, 0]], dtype=float)
-    partner = match(neighbours, score, np.argsort(-score.reshape(-1), kind="stable"))
+    partner = match(neighbours, score, np.argsort(-score.reshape(-1), kind="stable"), UNPAIRED)
     assert (partner >= 0).all()
     assert neighbours[0, partner[0]] == 1
     assert neighbours[3, partner[3]] == 2
@@ -53,7 +53,7 @@ def test_an_unlucky_first_choice_is_repaired():
 def test_partners_are_mutual():
     coarse = coarse_of(sphere(), 0.3)
     score = pair_score(coarse)
-    partner = match(coarse.mesh.B, score, np.argsort(-score.reshape(-1), kind="stable"))
+    partner = match(coarse.mesh.B, score, np.argsort(-score.reshape(-1), kind="stable"), UNPAIRED)
     t = np.flatnonzero(partner >= 0)
     o = coarse.mesh.B[t, partner[t]]
     np.testing.assert_array_equal(coarse.mesh.B[o, partner[o]], t)

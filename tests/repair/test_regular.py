@@ -148,11 +148,12 @@ def test_what_is_regular_stays():
 
 def test_folded_quads_start_smoothed():
     given = paired(sphere(), 0.4)
-    assert unfolded(given) is given
+    assert unfolded(given) == (given, None)
     broken = given.copy()
     corner, opposite = given.quads[0, [0, 2]]
     broken.mesh.X[corner] = 1.3 * given.mesh.X[opposite] - 0.3 * given.mesh.X[corner]
-    whole = unfolded(broken)
+    whole, smoothed = unfolded(broken)
+    assert smoothed is not None
     assert scaled_jacobians(broken).min() <= 0.0 < scaled_jacobians(whole).min()
     away = np.linalg.norm(given.mesh.X - given.mesh.X[corner], axis=1) > 1.2
     assert away.any()

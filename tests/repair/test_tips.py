@@ -59,7 +59,7 @@ def test_tips_move_with_the_body():
 def test_smooth_and_sharp_bodies_have_none():
     for body in (sphere().assembly.triangulation, cube().assembly.triangulation):
         normals = body.normals
-        assert not find_tips(body, normals, np.zeros(len(body.vertices), dtype=bool), 60.0).any()
+        assert not find_tips(body, normals, np.zeros(len(body.vertices), dtype=bool), 60.0, 0.0).any()
     body = sphere().assembly.triangulation
     rng = np.random.default_rng(0)
     noisy = Triangulation(body.vertices + 1e-3 * rng.standard_normal(body.vertices.shape), body.triangles)
@@ -74,3 +74,17 @@ def test_the_layout_of_a_cone_keeps_its_apex(rings):
     assert layout.report.folded == 0
     assert layout.report.min_scaled_jacobian > 0.2
     assert len(layout) < 300
+
+
+def test_a_scratch_is_no_tip():
+    # one vertex pushed out of a fine flat grid leans its own triangles only
+    n = 21
+    i, j = np.meshgrid(np.arange(n), np.arange(n), indexing="ij")
+    points = np.stack([i.ravel(), j.ravel(), np.zeros(n * n)], axis=1) / (n - 1.0)
+    a = (i[:-1, :-1] * n + j[:-1, :-1]).ravel()
+    triangles = np.concatenate([np.stack([a, a + n, a + n + 1], 1), np.stack([a, a + n + 1, a + 1], 1)])
+    points[n * n // 2, 2] = 0.2
+    body = Triangulation(points, triangles)
+    free = np.zeros(n * n, dtype=bool)
+    assert find_tips(body, body.normals, free, 30.0, 0.0)[n * n // 2]
+    assert not find_tips(body, body.normals, free, 30.0, 0.15)[n * n // 2]
