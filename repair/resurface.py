@@ -19,6 +19,7 @@ from patchwright.models.tolerance import Tolerance
 from patchwright.repair.edge_curves import EdgeCurves
 from patchwright.repair.edge_fit import VertexShapes, edge_errors, fit_edge_curves
 from patchwright.repair.fit_error import patch_errors
+from patchwright.repair.knife_edges import with_knife_edges
 from patchwright.repair.network import PatchNetwork
 from patchwright.repair.patch_fit import Target, fit_group
 from patchwright.repair.patch_nets import PatchNets, coons_nets, folds, sides
@@ -82,6 +83,10 @@ def resurface(
     edges = fit_edge_curves(layout, target, np.full(len(layout.edges), FIRST_CELLS, dtype=np.int64))
     everything = np.arange(len(layout.quads))
     state = _fit(layout, edges, patch_cells, everything, None, target, method, noise)
+    given, layout = layout, with_knife_edges(layout, state.nets, target, allowed)
+    if layout is not given:
+        edges = fit_edge_curves(layout, target, np.asarray(edges.cells))
+        state = _fit(layout, edges, patch_cells, everything, None, target, method, noise)
     shapes = VertexShapes.of(layout, edges, state.nets, target)
 
     def fitted(cells: IntArray) -> EdgeCurves:
