@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from patchwright.models.arrays import Array, BoolArray
@@ -43,7 +45,7 @@ def _most_facing(body: Triangulation, normals: Array, points: Array, directions:
     """(k,) largest cosine between each direction and the normals of triangles whose middles are near its point."""
     from scipy.spatial import cKDTree
 
-    near = list(cKDTree(body.corners.mean(axis=1)).query_ball_point(points, reach))
+    near: Any = cKDTree(body.corners.mean(axis=1)).query_ball_point(points, reach)
     count = np.array([len(own) for own in near])
     triangles = np.concatenate([np.asarray(own, dtype=np.int64) for own in near])
     owner = np.repeat(np.arange(len(points)), count)
