@@ -32,6 +32,7 @@ from patchwright.repair.mend import BRIDGED, CUT, KEPT, Mended, mend
 from patchwright.repair.mended import LEFT_OUT
 from patchwright.repair.network import PatchNetwork
 from patchwright.repair.network_seams import measure
+from patchwright.repair.patch_crossings import crossing_entries
 from patchwright.repair.patch_fit import Target
 from patchwright.repair.quad_layout import QuadLayout, quad_layout
 from patchwright.repair.result import Face, LedgerEntry, Point, Problem, Progress, Repaired, Rung, Seam, Verdict
@@ -101,6 +102,8 @@ def repair_mesh(
     faces = _faces(network, mended, made)
     invented = float(mended.triangulation.areas[mended.origin == BRIDGED].sum() / mended.triangulation.areas.sum())
     ledger += (_fitting_entry(network, mended, tolerance, tries, resolution),)
+    crossing = crossing_entries(network, mended.triangulation.tag_names, tolerance.gap)
+    ledger += crossing
     if isinstance(ground, TrueGround):
         ledger += (true_entry(ground, network, assembly),)
     if scope == "all":
@@ -120,6 +123,8 @@ def repair_mesh(
         )
         for face, surface in zip(faces, made.surfaces, strict=True)
     )
+    figures = _figures(network, len(faces), blocks, mended, seams, deviation)
+    figures["pairs of patches that cross"] = sum(entry.count for entry in crossing)
     return Repaired(
         verdict,
         faces,
@@ -132,7 +137,7 @@ def repair_mesh(
         Assembly(parts, unit=assembly.unit, source=assembly.source, topology=made.topology),
         grid=block_grid(network, blocks, GRID),
         network=network,
-        figures=_figures(network, len(faces), blocks, mended, seams, deviation),
+        figures=figures,
     )
 
 

@@ -23,6 +23,7 @@ _SUMS = (
     "pieces of triangles cut where bodies cross",
     "triangles invented to bridge gaps",
     "patches fitted",
+    "patches cross",
     CARRIED,
 )
 """ledger entries that sum up what others did, or that follow for every model"""
