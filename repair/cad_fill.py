@@ -1,7 +1,8 @@
 """What is invented in a CAD model: gaps bridged and openings filled by new faces on exactly the free edges round them.
 
 A planar opening gets the plane trimmed by its edges, loops inside each other one plane with holes; any other ring the
-best surface through it (`ring_patch`). Faces around stay as they are; the whole is built and judged before it counts.
+best surface through it (`ring_patch`), or where one surface cannot, several about a centre (`split_ring`). Faces around
+stay as they are; the whole is built and judged before it counts.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from patchwright.models.cad.connectivity import components
 from patchwright.models.cad.rebuild import NOTHING
 from patchwright.models.cad.sewing import surface_difference
 from patchwright.models.errors import EngineError
+from patchwright.models.topology import Topology
 from patchwright.repair.cad_draft import RIM_SHARE, Attempt, Draft, Limits, apart
 from patchwright.repair.cad_outcome import Filled, Outcome, point
 from patchwright.repair.cad_sew import SEAM_SHARE, UNCHANGED
@@ -25,7 +27,10 @@ from patchwright.repair.diagnosis import Defect, Diagnosis
 from patchwright.repair.face_steps import bad_faces, built, widest
 from patchwright.repair.new_face import rim_normals, with_patch
 from patchwright.repair.result import Problem
-from patchwright.repair.ring_patch import RingPatch, ring_patch
+from patchwright.repair.ring_judged import RingPatch
+from patchwright.repair.ring_patch import ring_patch
+from patchwright.repair.ring_sides import Normals
+from patchwright.repair.split_ring import SplitRing, split_ring
 
 BRIDGED = "bridge"  # as the plan and the decisions call it
 SAME = 0.05  # of a ring's diagonal: how far its box may differ from that of the gap it is
@@ -81,9 +86,9 @@ def closed(outcome: Outcome, decisions: Decisions | None, deadline: Deadline) ->
     )
     outcome = _patched(outcome, again, FILLED, "fill", deadline)
     problems = [_problem(outcome, loop, reason_against(loop, flat)) for loop in loops if not loop.closed]
-    filled = {face for one in outcome.filled for face in one.around}
+    open_still = free_loops(outcome.assembly) if again else ()
     for loop in again:
-        if not set(loop.faces) <= filled:
+        if any(np.linalg.norm(loop.centre - other.centre) <= flat for other in open_still):
             last = outcome.failed[-1].reason if outcome.failed else "the result does not hold"
             problems.append(_problem(outcome, loop, last))
     return outcome, tuple(problems)
@@ -142,40 +147,67 @@ def _uncovered(
 
 
 def _patched(outcome: Outcome, rings: tuple[FreeLoop, ...], what: str, word: str, deadline: Deadline) -> Outcome:
-    """The outcome with a new part through each ring that can have one."""
+    """The outcome with new parts through each ring that can have them: one surface, or where that fails several."""
     model = outcome.assembly
     if model.topology is None or not rings:
         return outcome
     limits = Limits.of(model.diagonal, deadline.left(600.0))
-    draft, new = Draft(model, model.topology), []
-    failed = list(outcome.failed)
+    for split in (False, True):
+        draft, new, failed = _filled(Draft(model, model.topology), rings, what, word, limits, split)
+        if not new:
+            break
+        made = built(model, draft, limits)
+        reason = _wrong(model, made, limits)
+        if made is not None and not reason:
+            return replace(outcome, assembly=made, filled=(*outcome.filled, *new), failed=(*outcome.failed, *failed))
+        around = tuple(dict.fromkeys(face for one in new for face in one.around))
+        outcome = replace(outcome, failed=(*outcome.failed, Attempt(what, around, reason, rings[0].centre)))
+    return replace(outcome, failed=(*outcome.failed, *failed))
+
+
+def _filled(
+    draft: Draft, rings: tuple[FreeLoop, ...], what: str, word: str, limits: Limits, split: bool
+) -> tuple[Draft, list[Filled], list[Attempt]]:
+    """The draft with new parts, which they are, and why some rings have none; `split` asks for several per ring."""
+    new: list[Filled] = []
+    failed: list[Attempt] = []
     for ring in rings:
-        if deadline.passed:
+        if limits.expired:
             failed.append(Attempt(what, ring.faces, "the time was up", ring.centre))
             continue
-        patch = ring_patch(draft.topology, (ring.steps,), rim_normals(draft, set()), limits)
-        if isinstance(patch, str):
-            failed.append(Attempt(what, ring.faces, patch, ring.centre))
+        several: SplitRing | str = _split(draft, ring, limits) if split else ""
+        one = ring_patch(draft.topology, (ring.steps,), rim_normals(draft, set()), limits)
+        if isinstance(one, str) and not split:
+            several = _split(draft, ring, limits)
+        if not isinstance(several, str):
+            draft, patches = replace(draft, topology=several.topology), several.patches
+        elif not isinstance(one, str):
+            patches = (one,)
+        else:
+            failed.append(Attempt(what, ring.faces, f"{one}; {several}", ring.centre))
             continue
-        draft, number = _with_part(draft, patch, ring, word, limits)
-        new.append(Filled(number, ring.faces, what, _how(patch)))
-    if not new:
-        return replace(outcome, failed=tuple(failed))
-    made = built(model, draft, limits)
-    reason = ""
+        for patch in patches:
+            draft, number = _with_part(draft, patch, ring, word, limits)
+            new.append(Filled(number, ring.faces, what, _how(patch)))
+    return draft, new, failed
+
+
+def _wrong(model: Assembly, made: Assembly | None, limits: Limits) -> str:
+    """Why a model with further parts does not hold; "" where it does."""
     if made is None:
-        reason = "the CAD kernel cannot build it"
-    elif max(map(_change, model.parts, made.parts)) > UNCHANGED * max(model.diagonal, 1.0):
-        reason = "building it would change a kept face"
-    elif bad_faces(made, limits) - bad_faces(model, limits):
-        reason = "the CAD kernel calls the result invalid"
-    elif widest(made) > max(widest(model), SEAM_SHARE * model.diagonal):
-        reason = "its seams gape"
-    if made is None or reason:
-        around = tuple(dict.fromkeys(face for one in new for face in one.around))
-        failed.append(Attempt(what, around, reason, rings[0].centre))
-        return replace(outcome, failed=tuple(failed))
-    return replace(outcome, assembly=made, filled=(*outcome.filled, *new), failed=tuple(failed))
+        return "the CAD kernel cannot build it"
+    if max(map(_change, model.parts, made.parts)) > UNCHANGED * max(model.diagonal, 1.0):
+        return "building it would change a kept face"
+    if bad_faces(made, limits) - bad_faces(model, limits):
+        return "the CAD kernel calls the result invalid"
+    return "its seams gape" if widest(made) > max(widest(model), SEAM_SHARE * model.diagonal) else ""
+
+
+def _split(draft: Draft, ring: FreeLoop, limits: Limits) -> SplitRing | str:
+    def normals(topology: Topology) -> Normals:
+        return rim_normals(replace(draft, topology=topology), set())
+
+    return split_ring(draft.topology, ring.steps, normals, limits)
 
 
 def _with_part(draft: Draft, patch: RingPatch, ring: FreeLoop, word: str, limits: Limits) -> tuple[Draft, int]:

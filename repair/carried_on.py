@@ -16,6 +16,7 @@ from dataclasses import replace
 import numpy as np
 
 from patchwright.models.boundary_strip import SIDES
+from patchwright.models.cad.connectivity import is_point
 from patchwright.models.cad.editing import with_loops
 from patchwright.models.errors import GeometryError
 from patchwright.models.extension import surface_on
@@ -29,12 +30,13 @@ from patchwright.repair.seam_join import COARSE, FINE, join_seams
 from patchwright.repair.strip import speed_across
 
 ROOM = 2.0  # times the reach: how far a surface is carried on where its parameter lines run straight across
+DENSE = 33  # points of a free edge that stand for it
 PROBES = 9  # per free edge
 MOST = 0.25  # of a surface's range: what is carried on farther has little to do with it
 
 
 def join_carried_on(
-    draft: Draft, limits: Limits, shares: tuple[float, ...] = (*FINE, *COARSE), loose: Collection[int] = ()
+    draft: Draft, limits: Limits, shares: tuple[float, ...] = (FINE[-1], *COARSE), loose: Collection[int] = ()
 ) -> tuple[Draft, tuple[Change, ...]]:
     """Every seam that faces make once their surfaces are carried on, at each share of the diagonal in turn."""
     changes: list[Change] = []
@@ -56,14 +58,15 @@ def join_carried_on(
 
 
 def _longer(draft: Draft, reach: float) -> dict[int, Surface]:
-    """The surfaces of faces with free edges along natural sides, or nearly so, carried on there."""
+    """The surfaces of faces with free edges beside others' and along natural sides, or nearly so, carried on there."""
     owner = draft.owners()
+    beside = _beside(draft, owner, reach)
     out: dict[int, Surface] = {}
-    for face in sorted(set(owner.values())):
+    for face in sorted({owner[edge] for edge in beside}):
         surface = draft.parts[face].surface
         if not isinstance(surface, NurbsSurface):
             continue
-        free = [use for loop in draft.topology.loops[face] for use in loop if owner.get(use.edge) == face]
+        free = [use for loop in draft.topology.loops[face] for use in loop if use.edge in beside]
         uv = [use.pcurve(np.linspace(*use.pcurve.domain, PROBES)) for use in free]
         box = np.array(surface.domain)
         for side in SIDES:
@@ -77,6 +80,25 @@ def _longer(draft: Draft, reach: float) -> dict[int, Surface]:
                 out[face] = surface_on(surface, (box[0, 0], box[0, 1]), (box[1, 0], box[1, 1]))
             except GeometryError:
                 continue
+    return out
+
+
+def _beside(draft: Draft, owner: dict[int, int], reach: float) -> set[int]:
+    """The free edges that come within reach of another face's, as far as points along them tell."""
+    from scipy.spatial import cKDTree
+
+    edges = sorted(edge for edge in owner if not is_point(draft.topology.curves[edge]))
+    if not edges:
+        return set()
+    points = np.stack([c(np.linspace(*c.domain, DENSE)) for c in (draft.topology.curves[edge] for edge in edges)])
+    face = np.repeat([owner[edge] for edge in edges], DENSE)
+    step = np.linalg.norm(np.diff(points, axis=1), axis=2).max(axis=1)
+    tree = cKDTree(points.reshape(-1, 3))
+    out = set()
+    for k, edge in enumerate(edges):
+        near = tree.query_ball_point(points[k], reach + step[k])
+        if any((face[found] != owner[edge]).any() for found in near):
+            out.add(edge)
     return out
 
 

@@ -21,7 +21,9 @@ from patchwright.repair.loop_shape import polygon, signed_area
 from patchwright.repair.pcurves import parameters, widened
 from patchwright.repair.result import Rung
 from patchwright.repair.retrace import over_poles
-from patchwright.repair.ring_patch import Normals, RingPatch, Steps, ring_patch
+from patchwright.repair.ring_judged import RingPatch
+from patchwright.repair.ring_patch import ring_patch
+from patchwright.repair.ring_sides import Normals, Steps
 
 GRID = 24  # per direction of the new surface's box, for its distance from the old one
 WHAT = "face replaced"

@@ -28,7 +28,9 @@ NEGLIGIBLE = 1e-10  # of the largest singular value: combinations of conditions 
 Beside = Callable[[Array], Array]  # unit normals (k, 3) at parameters (k,) along a side; nan where nothing is known
 
 
-def tangent_coons(coons: NurbsSurface, beside: dict[Side, Beside], enough: float) -> tuple[NurbsSurface, float]:
+def tangent_coons(
+    coons: NurbsSurface, beside: dict[Side, Beside], enough: float, sound: Callable[[NurbsSurface], bool] | None = None
+) -> tuple[NurbsSurface, float]:
     """The surface and the largest angle (degrees) to the tangent planes beside it.
 
     Parameters
@@ -36,6 +38,7 @@ def tangent_coons(coons: NurbsSurface, beside: dict[Side, Beside], enough: float
     coons : on [0, 1]^2; its sides are kept
     beside : the sides that are to be met smoothly
     enough : degrees; the coarsest knots with which all are that near are taken, or those that come nearest
+    sound : which surfaces count at all, if not all do
     """
     base = coons.clamped()
     base = base.elevated(*(max(0, 3 - degree) for degree in base.degree))
@@ -46,7 +49,7 @@ def tangent_coons(coons: NurbsSurface, beside: dict[Side, Beside], enough: float
             break
         made = _solved(fine, beside)
         off = worst_angle(made, beside)
-        if off < least:
+        if off < least and (sound is None or sound(made)):
             best, least = made, off
         if least <= enough:
             break
@@ -66,7 +69,7 @@ def worst_angle(surface: NurbsSurface, beside: dict[Side, Beside]) -> float:
         size = np.linalg.norm(own, axis=1)
         known = np.isfinite(other).all(axis=1) & (size > 1e-9 * size.max(initial=0.0))
         across = np.linalg.norm(np.cross(own[known], other[known]), axis=1)
-        along = np.abs(np.einsum("ij,ij->i", own[known], other[known]))
+        along = np.einsum("ij,ij->i", own[known], other[known])  # a patch turned over is 180 degrees off
         worst = max(worst, float(np.degrees(np.arctan2(across, along)).max(initial=0.0)))
     return worst
 

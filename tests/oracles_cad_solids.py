@@ -1,15 +1,19 @@
-"""CAD solids made by the CAD kernel alone: a box with all edges rounded, a tapered wing lofted through airfoils."""
+"""CAD made by the CAD kernel alone: a box with all edges rounded, a tapered lofted wing, a tube with a hole."""
 
 from __future__ import annotations
 
 import numpy as np
-from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeEdge, BRepBuilderAPI_MakeWire
+from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeEdge, BRepBuilderAPI_MakeFace, BRepBuilderAPI_MakeWire
 from OCP.BRepFilletAPI import BRepFilletAPI_MakeFillet
+from OCP.BRepLib import BRepLib
 from OCP.BRepOffsetAPI import BRepOffsetAPI_ThruSections
 from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
 from OCP.collections import HArray1_gp_Pnt
+from OCP.Geom import Geom_CylindricalSurface
+from OCP.Geom2d import Geom2d_Line
+from OCP.GeomAbs import GeomAbs_Shape
 from OCP.GeomAPI import GeomAPI_Interpolate
-from OCP.gp import gp_Pnt
+from OCP.gp import gp_Ax3, gp_Dir, gp_Dir2d, gp_Pnt, gp_Pnt2d
 from OCP.TopAbs import TopAbs_ShapeEnum
 from OCP.TopoDS import TopoDS
 from oracles_cad_damage import SIZES, parts_of
@@ -49,3 +53,18 @@ def lofted_wing():
         loft.AddWire(wire.Wire())
     loft.Build()
     return loft.Shape()
+
+
+def pierced_tube(corners: np.ndarray, radius: float = 1.0, height: float = 4.0):
+    """The wall of a tube without the polygon of `corners` (k, 2), counter-clockwise in angle and height."""
+    frame = gp_Ax3(gp_Pnt(0, 0, 0), gp_Dir(0, 0, 1))
+    surface = Geom_CylindricalSurface(frame, radius)
+    wire = BRepBuilderAPI_MakeWire()
+    for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True):
+        size = float(np.linalg.norm(b - a))
+        line = Geom2d_Line(gp_Pnt2d(*a.tolist()), gp_Dir2d(*(b - a).tolist()))
+        wire.Add(BRepBuilderAPI_MakeEdge(line, surface, 0.0, size).Edge())
+    whole = BRepBuilderAPI_MakeFace(surface, 0.0, 2.0 * np.pi, 0.0, height, 1e-9).Face()
+    pierced = BRepBuilderAPI_MakeFace(whole, TopoDS.Wire(wire.Wire().Reversed())).Face()
+    BRepLib.BuildCurves3d_s(pierced, 1e-10, GeomAbs_Shape.GeomAbs_C1, 14, 100)
+    return pierced

@@ -33,6 +33,37 @@ def with_edges(topology: Topology, curves: list[NurbsCurve], ends: list[tuple[Ar
     )
 
 
+def with_cut(topology: Topology, edge: int, t: float) -> tuple[Topology, tuple[int, int]]:
+    """The topology with an edge cut in two at a parameter, and its parts' numbers; the old edge has no use left."""
+    curve, corner, first = topology.curves[edge], len(topology.vertices), len(topology.curves)
+    t0, t1 = curve.domain
+    a, b = topology.ends[edge].tolist()
+    loops = []
+    for own in topology.loops:
+        rows = []
+        for loop in own:
+            row: list[EdgeUse] = []
+            for use in loop:
+                if use.edge != edge:
+                    row.append(use)
+                    continue
+                parts = [
+                    EdgeUse(first, use.reversed, use.pcurve.restricted(t0, t)),
+                    EdgeUse(first + 1, use.reversed, use.pcurve.restricted(t, t1)),
+                ]
+                row += parts[::-1] if use.reversed else parts
+            rows.append(tuple(row))
+        loops.append(tuple(rows))
+    cut = replace(
+        topology,
+        vertices=np.concatenate([topology.vertices, curve(np.array([t]))]),
+        curves=(*topology.curves, curve.restricted(t0, t), curve.restricted(t, t1)),
+        ends=np.concatenate([topology.ends, [[a, corner], [corner, b]]]),
+        loops=tuple(loops),
+    )
+    return cut, (first, first + 1)
+
+
 def welded(topology: Topology, distance: float) -> Topology:
     """Corners within the distance are one; which of them stays is the one with the lowest number.
 
