@@ -1,7 +1,8 @@
-"""Triangles to quads only: good pairs are joined, then everything is split once at edge middles and centres.
+"""Triangles to quads only: good pairs are joined, then split at edge middles and centres.
 
-A joined pair becomes four quads, a triangle left alone three, so the result is pure quad whatever the pairs (the
-topology of Catmull-Clark's first step). Pairs are never joined across a feature.
+Where all edges are halved, a joined pair becomes four quads, a triangle left alone three, so the result is pure quad
+whatever the pairs (the topology of Catmull-Clark's first step). Where few quads shall come out, only those edges are
+halved that must be (`halving`), and more pairs are joined. Pairs are never joined across a feature.
 """
 
 from __future__ import annotations

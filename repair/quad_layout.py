@@ -1,7 +1,7 @@
 """`QuadLayout`: quads over a triangulation, each to become one patch, with the path every edge takes on the surface.
 
 `quad_layout` finds one: features and sizes of the triangulation, coarse triangles along the features, pairs of them
-made quads, all split once into quads only, made regular, then smoothed.
+made quads, all split into quads only (where features crowd, no more than must be), made regular, then smoothed.
 """
 
 from __future__ import annotations
