@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from patchwright.models.arrays import Array, BoolArray, IntArray
+from patchwright.repair.crease_lines import along_creases
 from patchwright.repair.edge_curves import (
     SAMPLES_PER_CELL,
     EdgeCurves,
@@ -56,7 +57,10 @@ class VertexShapes:
         """From a first fit."""
         sectors = vertex_normals(layout, nets, sector_normals(layout, facing(nets, target)), target)
         smooth = smooth_edges(layout)
-        flat = with_end_tangents(edges, *edge_end_normals(layout, sectors), np.zeros(len(layout.edges), dtype=bool))
+        none = np.zeros(len(layout.edges), dtype=bool)
+        flat = with_end_tangents(edges, *edge_end_normals(layout, sectors), none)
+        flat, sectors = along_creases(layout, flat, sectors)
+        flat = with_end_tangents(flat, *edge_end_normals(layout, sectors), none)
         open_ = spread(layout, flat, sectors, smooth)
         lined, straight = straighten(layout, open_, smooth, sectors)
         legs = leaving(lined)
