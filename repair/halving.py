@@ -49,6 +49,11 @@ def halved(
     from patchwright.repair import _halving_kernel as kernel
 
     cost = face_costs(faces, points, normals, np.where(face_edges >= 0, fixed[face_edges], False))
+    # two quads that share opposite sides, both halved there alone, would make two edges of the same ends
+    own = np.arange(len(faces))[:, None]
+    other = np.where(face_edges >= 0, edge_faces[face_edges].sum(axis=2) - own, -1)
+    for k, mask in ((0, 5), (1, 10)):
+        cost[(other[:, k] >= 0) & (other[:, k] == other[:, k + 2]), mask] = NEVER
     n = len(points)
     edge_off, by_edge = _lists(edges, n)
     face_off, by_face = _lists(faces, n)

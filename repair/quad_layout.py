@@ -14,7 +14,7 @@ import numpy as np
 
 from patchwright.models.arrays import Array, BoolArray, IntArray
 from patchwright.models.arrays import frozen as own_copy
-from patchwright.models.errors import ParameterError
+from patchwright.models.errors import GeometryError, ParameterError
 from patchwright.models.triangulation import Triangulation
 
 if TYPE_CHECKING:
@@ -26,6 +26,7 @@ METHODS = ("pairs", "quadriflow")
 RETRIES = 3
 NEAR_TARGET = 1.15  # number of quads against the wanted one
 CROWDED = 2.0  # the same, beyond which no more edges are halved than must be
+MOST_QUADS = 40_000  # more would take a fit hours; no one could work with as many patches
 SPARSE = 1.5  # size of the coarse triangles then, in wanted sizes of quads: two of them make one or two quads
 
 
@@ -141,7 +142,7 @@ def quad_layout(
     Raises
     ------
     ParameterError : an unknown method, a target below 1, an angle that is not between 0 and 180.
-    GeometryError : the triangulation is empty, not 2-manifold or not oriented.
+    GeometryError : the triangulation is empty, not 2-manifold or not oriented, or asks for more than MOST_QUADS quads.
     EngineError : the optional engine failed.
     """
     if method not in METHODS:
@@ -184,7 +185,7 @@ def _pairs(features: Features, ridges: Ridges | None, target: int | None) -> Qua
     can be.
     """
     from patchwright.repair.pairing import pair
-    from patchwright.repair.regular import regularize, unfolded
+    from patchwright.repair.regular import regularize, simple, unfolded
     from patchwright.repair.remesh import remesh
     from patchwright.repair.sizing import size_field
 
@@ -194,7 +195,13 @@ def _pairs(features: Features, ridges: Ridges | None, target: int | None) -> Qua
         paired = pair(remesh(features, 2.0 * size))
         forced = target is None or (turn == RETRIES - 1 and error > np.log(CROWDED))  # larger triangles did not do
         if forced and len(paired.quads) > CROWDED * wanted:
-            paired = pair(remesh(features, SPARSE * size), few=True)
+            few = pair(remesh(features, SPARSE * size), few=True)
+            paired = few if simple(few) else paired
+        if len(paired.quads) > MOST_QUADS:
+            raise GeometryError(
+                f"{len(features.kind)} sharp lines with {len(features.corners)} corners ask for {len(paired.quads)} "
+                f"patches or so, and {MOST_QUADS} are the most; take parts of the model, or wrap it first"
+            )
         begun, smoothed = unfolded(paired)
         quad_mesh = regularize(begun)
         ratio = len(quad_mesh.quads) / wanted

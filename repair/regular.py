@@ -41,9 +41,10 @@ def regularize(quad_mesh: QuadMesh) -> QuadMesh:
         mesh, net = opened(quad_mesh, ROOM, 8 * LIMITS[-1] + 64)
         disc, scratch = _room(len(net.quads), len(net.at), LIMITS[-1])
         done = zipper.zip_up(mesh, quad_mesh.ground, net, disc, scratch, ZIP_LIMIT, LEAST, STRETCH, MOST_RISE)
-        if not done:
+        zipped = closed(quad_mesh, mesh, net) if done else quad_mesh
+        if not done or not simple(zipped):
             break
-        quad_mesh = _filled(closed(quad_mesh, mesh, net), LIMITS[-1])
+        quad_mesh = _filled(zipped, LIMITS[-1])
     return quad_mesh
 
 
@@ -56,8 +57,17 @@ def _filled(quad_mesh: QuadMesh, limit: int) -> QuadMesh:
         disc, scratch = _room(len(net.quads), len(net.at), limit)
         if not kernel.regularize(mesh, quad_mesh.ground, net, disc, scratch, limit, LEAST, STRETCH):
             break
-        quad_mesh = closed(quad_mesh, mesh, net)
+        filled = closed(quad_mesh, mesh, net)
+        if not simple(filled):
+            break
+        quad_mesh = filled
     return quad_mesh
+
+
+def simple(quad_mesh: QuadMesh) -> bool:
+    """Whether no two edges of quads have the same two ends, which are all that a layout tells edges by."""
+    tail, head = quad_mesh.quads.reshape(-1), np.roll(quad_mesh.quads, -1, axis=1).reshape(-1)
+    return len(np.unique(tail * len(quad_mesh.mesh.X) + head)) == len(tail)
 
 
 def opened(quad_mesh: QuadMesh, times: int, more: int) -> tuple[Any, Any]:

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from layout_shapes import cube, plate_with_hole, sphere, torus
 
+import patchwright.repair.quad_layout as quad_layout_module
+from patchwright.models.errors import GeometryError
 from patchwright.repair.features import find_features
 from patchwright.repair.halving import face_costs, halved
 from patchwright.repair.pairing import PIECES, _split_faces, pair
@@ -59,6 +61,17 @@ def test_squares_stay_whole():
     normals = np.tile([0.0, 0.0, 1.0], (len(faces), 1))
     marks = halved(faces, face_edges, edge_faces, edges, points, normals, np.zeros(len(edges), dtype=bool))
     assert not marks.any()
+
+
+def test_two_quads_back_to_back_get_no_edge_twice():
+    # a tube of two squares that share two opposite sides; its rims ask for one halved side more than none
+    faces = np.array([[0, 1, 2, 3], [0, 3, 2, 1]])
+    edges = np.array([[0, 1], [1, 2], [2, 3], [0, 3]])
+    face_edges, edge_faces = np.array([[0, 1, 2, 3], [3, 2, 1, 0]]), np.tile([0, 1], (4, 1))
+    points = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+    normals = np.array([[0.0, 0, 1], [0, 0, -1]])
+    marks = halved(faces, face_edges, edge_faces, edges, points, normals, np.zeros(4, dtype=bool))
+    assert marks.sum() in (0, 4)
 
 
 @pytest.mark.parametrize("size", [0.2, 0.5])
@@ -116,3 +129,9 @@ def test_pieces_fill_their_face():
             np.testing.assert_allclose(area.sum(), 1.0 if count == 4 else 0.5, rtol=1e-14)
             assert len(quads) == len(pieces) == len(owner)
             assert len(centred) == int(any(8 in piece for piece in pieces))
+
+
+def test_a_layout_of_too_many_quads_is_refused_at_once(monkeypatch):
+    monkeypatch.setattr(quad_layout_module, "MOST_QUADS", 10)
+    with pytest.raises(GeometryError, match="sharp lines with"):
+        quad_layout_module.quad_layout(plate_with_hole())
