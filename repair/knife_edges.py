@@ -19,7 +19,7 @@ from patchwright.repair.quad_layout import QuadLayout
 from patchwright.repair.spline_space import collocation
 from patchwright.repair.vertex_shapes import facing
 
-KNIFE = 60.0  # degrees by which the target turns within the tolerance of an edge, in the mean along it
+KNIFE = 45.0  # degrees by which the target turns within the tolerance of an edge, in the mean along it
 CUSP = 90.0  # degrees by which it turns so near one end, where there is no common normal
 SAMPLES = 9  # along each edge
 ACROSS = 0.125  # of the patch: how far from the edge the target is asked at most
