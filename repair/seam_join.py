@@ -23,7 +23,7 @@ from patchwright.repair.cad_draft import Change, Draft, Limits
 from patchwright.repair.decisions import CARRIED_ON, CROSSED
 from patchwright.repair.face_sides import one_sided
 from patchwright.repair.loop_shape import in_step, simple
-from patchwright.repair.pcurves import below, inside
+from patchwright.repair.pcurves import below, inside, widened
 from patchwright.repair.result import Rung
 from patchwright.repair.seam_curves import EXACT, Judged, Meeting, common, judged, reattached, track, uses_of
 from patchwright.repair.seam_nodes import Nodes, placed
@@ -248,6 +248,7 @@ def _rebuilt(draft: Draft, nodes: Nodes, work: _Work) -> tuple[Draft, set[int]]:
     ends = np.concatenate([to[topology.ends], fresh])
     curves = (*topology.curves, *(edge.curve for edge in work.edges))
     changed = {}
+    surfaces = dict(work.surfaces)
     for face, loops in enumerate(topology.loops):
         if not any(use.edge in work.stands for loop in loops for use in loop):
             continue
@@ -266,8 +267,10 @@ def _rebuilt(draft: Draft, nodes: Nodes, work: _Work) -> tuple[Draft, set[int]]:
                 row.pop()
             rows.append(tuple(in_step(work.surfaces.get(face, draft.surface(face)), row)))
         changed[face] = tuple(rows)
+        points = np.concatenate([use.pcurve.control_points for row in rows for use in row])
+        surfaces[face] = widened(surfaces.get(face, draft.surface(face)), points)  # a turn on may be out of its range
     new = replace(topology, vertices=nodes.vertices, curves=curves, ends=ends)
-    surfaces = {face: surface for face, surface in work.surfaces.items() if surface is not draft.surface(face)}
+    surfaces = {face: surface for face, surface in surfaces.items() if surface is not draft.surface(face)}
     return draft.with_surfaces(surfaces, compacted(with_loops(new, changed)), same=True), set(changed)
 
 
