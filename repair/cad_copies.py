@@ -10,15 +10,17 @@ from dataclasses import replace
 
 import numpy as np
 
+from patchwright.models.analytic import Cone, Cylinder, Sphere, Torus
 from patchwright.models.arrays import Array
 from patchwright.models.assembly import Assembly
 from patchwright.models.cad.connectivity import is_point
 from patchwright.models.cad.editing import compacted
 from patchwright.models.closest_point import closest_on_curve
 from patchwright.models.nurbs_curve import NurbsCurve
+from patchwright.models.surface import Surface
 from patchwright.models.topology import Topology
 from patchwright.repair.cad_outcome import point
-from patchwright.repair.meeting import feet
+from patchwright.repair.pcurves import parameters, widened
 from patchwright.repair.result import LedgerEntry, Rung
 
 COINCIDENT = 1e-6  # of the diagonal: faces this near to each other are one
@@ -90,7 +92,19 @@ def _same(model: Assembly, a: int, b: int, near: float) -> bool:
     if surface is None or not len(mesh):
         return False
     corners = mesh.vertices[:: max(1, len(mesh.vertices) // INSIDE)]
-    return float(np.linalg.norm(feet(surface, corners)[0] - corners, axis=1).max()) <= near
+    return float(np.linalg.norm(_feet(surface, corners) - corners, axis=1).max()) <= near
+
+
+def _feet(surface: Surface, points: Array) -> Array:
+    """(k, 3) feet of points in any order: parameters that run round are taken back into one turn."""
+    uv = parameters(surface, points)
+    for k, kinds in enumerate(((Cylinder, Cone, Sphere, Torus), (Torus,))):
+        if isinstance(surface, kinds):
+            low = surface.domain[k][0]
+            uv[:, k] = low + np.mod(uv[:, k] - low, 2.0 * np.pi)
+    wide = widened(surface, uv)
+    u, v = np.clip(uv, *np.array(wide.domain).T).T
+    return np.asarray(wide(u, v))
 
 
 def _border(model: Assembly, face: int) -> list[NurbsCurve]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from OCP.BRepPrimAPI import BRepPrimAPI_MakeSphere
 from oracles_cad_damage import (
     ROUNDED_VOLUME,
     cut_back,
@@ -55,3 +56,11 @@ def test_faces_near_each_other_and_smaller_ones_are_no_copies(tmp_path):
         once, entries = without_copies(model)
         assert once is model
         assert entries == ()
+
+
+def test_a_copy_of_a_cap_with_a_pole_is_found(tmp_path):
+    # points of a dome come in any order round it: their angles are compared within one turn
+    ball = faces_of(BRepPrimAPI_MakeSphere(2.0).Shape())
+    model = read(written(tmp_path / "balls.step", [*ball, *(with_own_edges(face) for face in ball)], {1}))
+    once, entries = without_copies(model)
+    assert len(entries) == len(once.parts) == 1
