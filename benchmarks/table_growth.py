@@ -17,9 +17,6 @@ from __future__ import annotations
 import argparse
 import json
 import resource
-import signal
-import subprocess
-import sys
 import tempfile
 import time
 from functools import partial
@@ -28,6 +25,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from rows import limit_processor, print_row, row_of_child
 
 LEAST = 1e4  # triangles at which the jitter is `JITTER`
 JITTER = 1e-4  # of the length
@@ -110,14 +108,7 @@ def measured(triangles: int, whole: bool) -> dict[str, Any]:
 
 def one(triangles: int, whole: bool, limit: float) -> dict[str, Any]:
     """`measured` in a process of its own."""
-    command = [sys.executable, __file__, "--one", str(triangles), "--limit", str(limit)] + ["--whole"] * whole
-    done = subprocess.run(command, capture_output=True, text=True, timeout=20.0 * limit)
-    lines = [line for line in done.stdout.splitlines() if line.startswith("ROW ")]
-    if lines:
-        return dict(json.loads(lines[-1][4:]))
-    if done.returncode == -signal.SIGXCPU:
-        return {"why": f"not done after {limit:g} s of processor time"}
-    return {"why": (done.stderr.strip().splitlines() or [f"exit code {done.returncode}"])[-1]}
+    return row_of_child(__file__, ["--one", str(triangles), *["--whole"] * whole], limit)
 
 
 def table(rows: list[dict[str, Any]]) -> str:
@@ -154,9 +145,9 @@ def main() -> None:
     arguments.add_argument("--one", type=int, help=argparse.SUPPRESS)
     asked = arguments.parse_args()
     if asked.one:
-        resource.setrlimit(resource.RLIMIT_CPU, (int(asked.limit), int(asked.limit) + 5))
+        limit_processor(asked.limit)
         measured(WARM, asked.whole)
-        print("ROW " + json.dumps(measured(asked.one, asked.whole)))
+        print_row(measured(asked.one, asked.whole))
         return
     rows = [one(int(size), asked.whole, asked.limit) for size in asked.sizes]
     print(table(rows))
