@@ -5,15 +5,15 @@
 Cases: `featuretype.step` with three faces shifted, turned, cut back or shrunk by 0.1 or 1 % of its diagonal
 (`tests/oracles_cad_damage.py`); the cube sphere with patches 0.1 to 10 % apart; five models damaged in seven ways each
 (`cad_damage_cases.py`); the files of `PATCHWRIGHT_DATA` (default ../shared/data) that come with loose, open or invalid
-faces. Each case runs in a process of its own that is
-stopped at the limit of processor time. Results are written as STEP and judged on the file read back.
+faces. Each case runs in a process of its own that is stopped at the limit of processor time. Results are written as
+STEP and judged on the file read back.
 
 Columns: `kept` share of faces whose surface is identical to 1e-12; `gap` and `angle` the widest seam (share of the
 diagonal) and the 99th percentile of seam angles (degrees) of the input and of the result; `far` the farthest that any
 point of a result's face is from the damaged places, in gap widths, where it is off the undamaged model (damaged cases
 only); `valid` and `closed` by the kernel's check and the edges' use (of a model that was open: as many free edges as it
-had); `gmsh` whether gmsh meshes the result in 2-D as it
-is; `occt` the widest seam after OCCT sewing at the damage's size of the same file.
+had); `gmsh` whether gmsh meshes the result in 2-D as it is; `occt` the widest seam after OCCT sewing of the same file at
+the damage's size.
 """
 
 from __future__ import annotations
@@ -21,8 +21,6 @@ from __future__ import annotations
 import argparse
 import json
 import os
-import resource
-import signal
 import subprocess
 import sys
 import tempfile
@@ -30,7 +28,7 @@ import time
 from pathlib import Path
 
 import cad_damage_cases
-from rows import line
+from rows import heading, limit_processor, line, print_row, row_of_child
 
 HERE = Path(__file__).resolve().parent
 DATA = Path(os.environ.get("PATCHWRIGHT_DATA", HERE.parent.parent / "shared" / "data"))
@@ -216,17 +214,8 @@ def _meshed(path: Path) -> str:
 
 def judged(name: str, limit: float, with_gmsh: bool) -> dict[str, object]:
     """`judge` in a process of its own; a row in any case."""
-    command = [sys.executable, __file__, "--row", name, "--limit", str(limit), *([] if with_gmsh else ["--no-gmsh"])]
-    try:
-        done = subprocess.run(command, capture_output=True, text=True, timeout=10.0 * limit)
-    except subprocess.TimeoutExpired:
-        return {"verdict": "HANGS"}
-    if done.returncode == -signal.SIGXCPU:
-        return {"verdict": "OVER TIME", "why": f"not done after {limit:g} s of processor time"}
-    lines = [line for line in done.stdout.splitlines() if line.startswith("ROW ")]
-    if lines:
-        return dict(json.loads(lines[-1][4:]))
-    return {"verdict": "CRASHED", "why": (done.stderr.strip().splitlines() or ["no message"])[-1]}
+    row = row_of_child(__file__, ["--row", name, *([] if with_gmsh else ["--no-gmsh"])], limit)
+    return {"verdict": row.pop("how").upper(), **row} if "how" in row else row
 
 
 def main() -> None:
@@ -238,10 +227,10 @@ def main() -> None:
     arguments.add_argument("--row", help=argparse.SUPPRESS)
     asked = arguments.parse_args()
     if asked.row:
-        resource.setrlimit(resource.RLIMIT_CPU, (int(asked.limit), int(asked.limit) + 5))
-        print("ROW " + json.dumps(judge(asked.row, not asked.no_gmsh)))
+        limit_processor(asked.limit)
+        print_row(judge(asked.row, not asked.no_gmsh))
         return
-    print(" ".join(f"{name:>{len(form.format(0 if 's}' not in form else ''))}}" for name, form in COLUMNS))
+    print(heading(COLUMNS))
     rows = []
     for name in cases():
         if asked.only in name:
