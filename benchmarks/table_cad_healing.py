@@ -12,8 +12,8 @@ Columns: `kept` share of faces whose surface is identical to 1e-12; `gap` and `a
 diagonal) and the 99th percentile of seam angles (degrees) of the input and of the result; `far` the farthest that any
 point of a result's face is from the damaged places, in gap widths, where it is off the undamaged model (damaged cases
 only); `valid` and `closed` by the kernel's check and the edges' use (of a model that was open: as many free edges as it
-had); `gmsh` whether gmsh meshes the result in 2-D as it is; `occt` the widest seam after OCCT sewing of the same file at
-the damage's size.
+had); `gmsh` whether gmsh meshes the result in 2-D as it is; `occt` the widest seam after OCCT sewing of the same file
+at the damage's size.
 """
 
 from __future__ import annotations
