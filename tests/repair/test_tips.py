@@ -88,3 +88,16 @@ def test_a_scratch_is_no_tip():
     free = np.zeros(n * n, dtype=bool)
     assert find_tips(body, body.normals, free, 30.0, 0.0)[n * n // 2]
     assert not find_tips(body, body.normals, free, 30.0, 0.15)[n * n // 2]
+
+
+def test_a_scratch_beside_an_edge_or_turned_round_is_no_tip():
+    body = cone(height=3.0, rings=4)
+    along = np.zeros(len(body.vertices), dtype=bool)
+    assert find_tips(body, body.normals, along, 30.0)[0]
+    along[1] = True  # a curve one ring below
+    ring = float(np.linalg.norm(body.vertices[1] - body.vertices[0]))
+    assert find_tips(body, body.normals, along, 30.0, reach=0.99 * ring)[0]
+    assert not find_tips(body, body.normals, along, 30.0, reach=1.01 * ring)[0]
+    turned = body.normals.copy()
+    turned[0] *= -1.0
+    assert not find_tips(body, turned, np.zeros_like(along), 30.0)[0]
