@@ -8,7 +8,7 @@ stopped at the limit.
 
 Columns: `in`, `out` are the shares of the area within the fit tolerance, input to patches and patches to input;
 `features` is the share of the length of feature curves longer than 1 % of the diagonal that lies on block borders,
-measured by points along them (`--` where there are none); `quads`, `blocks`, `irregular` inner vertices off the
+measured by points along them (`-` where there are none); `quads`, `blocks`, `irregular` inner vertices off the
 features; `corner`, the smallest angle at a block's corner; largest normal angles over smooth seams in degrees: the 99th
 percentile and the largest between regular vertices (four edges, off the features), the same at irregular ones, and how
 many of all smooth seams are above 30.
@@ -20,12 +20,12 @@ import argparse
 import json
 import os
 import resource
-import signal
-import subprocess
 import sys
 import time
 from pathlib import Path
 from typing import Any
+
+from rows import heading, limit_processor, line, print_row, row_of_child
 
 HERE = Path(__file__).resolve().parent
 DATA = Path(os.environ.get("PATCHWRIGHT_DATA", HERE.parent.parent / "shared" / "data"))
@@ -36,7 +36,6 @@ LONG = 0.01  # of the diagonal: shorter features do not count
 ON = 1e-6  # of the diagonal: as near a point lies on a block border
 STEP = 1e-3  # of the diagonal, between points along features
 STEEP = 30.0  # degrees
-WALL = 10.0  # times the limit: a process that takes so long on the clock hangs
 COLUMNS = (
     ("name", "{:22s}"), ("in", "{:>8.3%}"), ("out", "{:>8.3%}"), ("features", "{:>8.3%}"), ("quads", "{:>6d}"),
     ("blocks", "{:>6d}"), ("irregular", "{:>9d}"), ("corner", "{:>6.1f}"), ("regular 99%", "{:>11.3f}"),
@@ -157,25 +156,7 @@ def _even(line: Any, step: float) -> Any:
 
 def judged(name: str, limit: float) -> dict[str, object]:
     """`judge` in a process of its own; a row in any case."""
-    command = [sys.executable, __file__, "--row", name, "--limit", str(limit)]
-    try:
-        done = subprocess.run(command, capture_output=True, text=True, timeout=WALL * limit)
-    except subprocess.TimeoutExpired:
-        return {"why": f"not done after {WALL * limit:g} s"}
-    if done.returncode == -signal.SIGXCPU:
-        return {"why": f"not done after {limit:g} s of processor time"}
-    lines = [line for line in done.stdout.splitlines() if line.startswith("ROW ")]
-    if lines:
-        return dict(json.loads(lines[-1][4:]))
-    return {"why": (done.stderr.strip().splitlines() or ["no message"])[-1]}
-
-
-def line(row: dict[str, object]) -> str:
-    cells = []
-    for name, form in COLUMNS:
-        width = int(form.split(":")[1].strip("<>}").split(".")[0].rstrip("dsf%"))
-        cells.append(form.format(row[name]) if row.get(name) is not None else "--".rjust(width))
-    return " ".join(cells) + (f"  {row['why']}" if row.get("why") else "")
+    return row_of_child(__file__, ["--row", name], limit)
 
 
 def everything() -> list[str]:
@@ -193,15 +174,14 @@ def main() -> None:
     arguments.add_argument("--row", help=argparse.SUPPRESS)
     asked = arguments.parse_args()
     if asked.row:
-        resource.setrlimit(resource.RLIMIT_CPU, (int(asked.limit), int(asked.limit) + 5))
-        print("ROW " + json.dumps(judge(asked.row)))
+        limit_processor(asked.limit)
+        print_row(judge(asked.row))
         return
-    widths = [int(form.split(":")[1].strip("<>}").split(".")[0].rstrip("dsf%")) for _, form in COLUMNS]
-    print(" ".join(name.rjust(width) for (name, _), width in zip(COLUMNS, widths, strict=True)))
+    print(heading(COLUMNS))
     rows = []
     for name in asked.names or everything():
         rows.append({"name": Path(name).name[:22], **judged(name, asked.limit)})
-        print(line(rows[-1]), flush=True)
+        print(line(rows[-1], COLUMNS), flush=True)
     if asked.json:
         asked.json.write_text(json.dumps(rows, indent=1))
 
