@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from table_filling import FUNCTIONS, KNOWN
 
-from patchwright.repair.filling import METHODS, fill
+from patchwright.repair.patches.filling import METHODS, fill
 
 
 @pytest.mark.parametrize("method", sorted(METHODS))

@@ -130,7 +130,7 @@ TOOLS: dict[str, tuple[str, Tool]] = {
 
 def judge(case: DefectCase, result: Triangulation) -> Facts:
     """What is measured on one result; its vertices at one place are one first."""
-    from patchwright.repair.crossings import crossing_pairs
+    from patchwright.repair.mender.crossings import crossing_pairs
 
     body = welded(result)
     size = case.triangulation.diagonal

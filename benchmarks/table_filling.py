@@ -22,7 +22,7 @@ import numpy as np
 from rows import heading, line
 
 from patchwright.models.arrays import Array, BoolArray
-from patchwright.repair.filling import fill
+from patchwright.repair.patches.filling import fill
 
 SIDE = 41
 WIDTHS = (0.05, 0.1, 0.2, 0.3, 0.4)

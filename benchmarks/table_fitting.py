@@ -12,9 +12,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from patchwright.repair.approximant import bicubic_approximant
-from patchwright.repair.fair_fit import curve_fit, fit_patches
-from patchwright.repair.spline_space import uniform_collocation
+from patchwright.repair.patches.approximant import bicubic_approximant
+from patchwright.repair.patches.fair_fit import curve_fit, fit_patches
+from patchwright.repair.patches.spline_space import uniform_collocation
 
 TOLERANCES = (1e-3, 1e-4, 1e-5)
 MOST = 64

@@ -78,7 +78,7 @@ def measured(triangles: int, whole: bool) -> dict[str, Any]:
     from patchwright.models import Tolerance
     from patchwright.models.io import write
     from patchwright.repair import diagnose, repair
-    from patchwright.repair.mend import mend
+    from patchwright.repair.mender.mend import mend
 
     model = dirty_aircraft(triangles)
     tolerance = Tolerance.of(model)

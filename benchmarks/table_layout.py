@@ -69,8 +69,8 @@ def judge(name: str) -> dict[str, object]:
 
     from patchwright.models.errors import GeometryError
     from patchwright.repair import repair
-    from patchwright.repair.blocks import find_blocks, smallest_corner
-    from patchwright.repair.joins import seam_angles, side_normals, smooth_edges
+    from patchwright.repair.layout.blocks import find_blocks, smallest_corner
+    from patchwright.repair.patches.joins import seam_angles, side_normals, smooth_edges
 
     start = time.process_time()
     repaired = repair(model(name))
@@ -113,7 +113,7 @@ def feature_share(triangulation: Any, layout: Any, blocks: Any) -> float | None:
     import numpy as np
     from scipy.spatial import cKDTree
 
-    from patchwright.repair.features import find_features
+    from patchwright.repair.layout.features import find_features
 
     features = find_features(triangulation)
     size = triangulation.diagonal

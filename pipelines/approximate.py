@@ -23,7 +23,7 @@ from patchwright.pipelines.scenes import Scene, draw_scenes
 from patchwright.pipelines.view import DIRECTION
 
 if TYPE_CHECKING:
-    from patchwright.repair.local_patch import LocalPatch
+    from patchwright.repair.patches.local_patch import LocalPatch
 
 APART = 1.08  # widths of the geometry between it and the patches in a picture
 DRAWN = 96  # cells of a patch along a side, drawn
@@ -53,7 +53,7 @@ class ApproximateRun:
     @property
     def converged(self) -> bool:
         """Whether every patch is within its tolerance."""
-        from patchwright.repair.local_patch import Status
+        from patchwright.repair.patches.local_patch import Status
 
         return all(p.patch.status is Status.WITHIN for p in self.patches)
 
@@ -67,7 +67,7 @@ def run_approximate(
     ------
     UnsupportedFormat : an output that cannot hold surfaces; else as `load_patches` and `approximate`.
     """
-    from patchwright.repair.local_patch import approximate
+    from patchwright.repair.patches.local_patch import approximate
 
     if "surfaces" not in format_of(output).holds:
         raise UnsupportedFormat(f"{output}: {format_of(output).name} cannot hold surfaces; write .step or .igs")

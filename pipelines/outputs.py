@@ -38,7 +38,7 @@ def write_outputs(study: Study, names: tuple[str, ...], report: Report) -> tuple
     holds the results of two runs.
     """
     from patchwright.models.io import write
-    from patchwright.repair.layout_file import save_layout
+    from patchwright.repair.layout.layout_file import save_layout
 
     prepare_folder(study.folder)
     repaired = study.repaired

@@ -33,7 +33,7 @@ from patchwright.pipelines.scenes import Scene, draw_scenes
 from patchwright.pipelines.view import DIRECTION
 
 if TYPE_CHECKING:
-    from patchwright.repair.local_patch import LocalPatch
+    from patchwright.repair.patches.local_patch import LocalPatch
     from patchwright.repair.result import Repaired
 
 SHARE = 1e-4  # of the diagonal: the tolerance of all cases
@@ -128,9 +128,9 @@ def _corners(surface: NurbsSurface, u: tuple[float, float], v: tuple[float, floa
 
 def approximate_case(case: PatchCase, form: str, refinement: str = "local") -> CaseResult:
     """Lay straight sides between the corners onto the geometry and approximate."""
-    from patchwright.repair.local_patch import approximate
-    from patchwright.repair.patch_ground import PatchGround
-    from patchwright.repair.patch_sides import Sides, laid, through
+    from patchwright.repair.patches.local_patch import approximate
+    from patchwright.repair.patches.patch_ground import PatchGround
+    from patchwright.repair.patches.patch_sides import Sides, laid, through
 
     begin = time.process_time()
     size = case.model.diagonal
@@ -176,7 +176,7 @@ def body_cases(report: Any) -> tuple[BodyResult, ...]:
 
 def draw_body(result: BodyResult, path: Path) -> Scene:
     """The dirty body with its free edges above, the patches below."""
-    from patchwright.repair.weld import weld, weld_distance
+    from patchwright.repair.mender.weld import weld, weld_distance
 
     body, colours, borders = output_surface(result.repaired)
     raw = result.model.triangulation

@@ -31,10 +31,10 @@ from patchwright.models.assembly import Assembly, Part
 from patchwright.models.errors import CorruptFile, GeometryError, ParameterError
 from patchwright.models.nurbs_surface import NurbsSurface
 from patchwright.models.tolerance import Tolerance
-from patchwright.repair.patch_ground import PatchGround
+from patchwright.repair.patches.patch_ground import PatchGround
 
 if TYPE_CHECKING:
-    from patchwright.repair.patch_sides import Side, Sides
+    from patchwright.repair.patches.patch_sides import Side, Sides
 
 TEXTS, LENGTHS = ("form", "twist", "filling", "parameters", "refinement", "hits"), ("offset", "angle")
 OPTIONS: dict[str, type] = {**dict.fromkeys(TEXTS, str), **dict.fromkeys(LENGTHS, float), "most": int}
@@ -145,7 +145,7 @@ def _allowed(limits: Tolerance, ground: PatchGround, model: Assembly) -> tuple[f
     """The fit tolerance the data can carry, and a note where it is wider than 1e-4 of the diagonal, or too narrow."""
     if model.is_cad:
         return limits.fit, ""
-    from patchwright.repair.faceting import faceting
+    from patchwright.repair.layout.faceting import faceting
     from patchwright.repair.mesh_route import WIDEST
 
     height = faceting(ground.body, limits.angle)
@@ -188,7 +188,7 @@ class _Source:
 
     def sides(self, entry: dict[str, Any]) -> Sides:
         """The four sides of one entry."""
-        from patchwright.repair.patch_sides import Sides, laid, through
+        from patchwright.repair.patches.patch_sides import Sides, laid, through
 
         reach = CORNER * self.model.diagonal
         if "corners" in entry:
@@ -216,7 +216,7 @@ class _Source:
 
     def side(self, told: Any) -> Side:
         """One side from its table."""
-        from patchwright.repair import patch_sides, side_paths
+        from patchwright.repair.patches import patch_sides, side_paths
 
         kinds = [k for k in KINDS if isinstance(told, dict) and k in told]
         if len(kinds) != 1:
@@ -247,7 +247,7 @@ class _Source:
         return side_paths.intersection_side(_operand(a), _operand(b), start, end)
 
     def _iso(self, told: dict[str, Any]) -> Side:
-        from patchwright.repair.patch_sides import iso_side
+        from patchwright.repair.patches.patch_sides import iso_side
 
         iso = told["iso"]
         held = [k for k in ("u", "v") if isinstance(iso, dict) and k in iso]

@@ -52,7 +52,7 @@ def _before(study: Study) -> Scene:
 
 def _welded(study: Study) -> Triangulation:
     """The input with its round-off welded: in a soup every edge is free, and a picture of them all shows nothing."""
-    from patchwright.repair.weld import weld, weld_distance
+    from patchwright.repair.mender.weld import weld, weld_distance
 
     body = _without_far_field(study)
     return weld(body, weld_distance(body, study.tolerance)[0]).triangulation

@@ -12,7 +12,7 @@ from patchwright.pipelines.progress import Report
 from patchwright.pipelines.study import Study
 
 if TYPE_CHECKING:
-    from patchwright.repair.quad_layout import QuadLayout
+    from patchwright.repair.layout.quad_layout import QuadLayout
 
 Outcome = tuple[Study, dict[str, Any]]
 
@@ -78,7 +78,7 @@ def _seconds(wanted: Any) -> float:
 def _layout(wanted: str, study: Study) -> QuadLayout | list[Any] | str:
     """The layout of a file, the patches of a list of patches, or "auto"."""
     from patchwright.pipelines.patch_list import load_patches
-    from patchwright.repair.layout_file import load_layout
+    from patchwright.repair.layout.layout_file import load_layout
 
     if wanted == AUTO:
         return wanted

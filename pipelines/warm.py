@@ -20,7 +20,7 @@ from patchwright.pipelines.progress import Terminal
 if TYPE_CHECKING:
     from patchwright.models.triangulation import Triangulation
 
-WITNESS = "patchwright.repair._remesh_kernel"  # compiled late in every repair of a triangulation
+WITNESS = "patchwright.repair.layout._remesh_kernel"  # compiled late in every repair of a triangulation
 SECTIONS = "patchwright.ssi._subdivision_kernel"  # compiled by every intersection of free-form surfaces
 MESH_SECTIONS = "patchwright.ssi._mesh_surface_kernel"  # by every intersection of a mesh with a curved surface
 _started = False  # in this process
@@ -79,11 +79,11 @@ def main() -> None:
     from patchwright.models.tolerance import Tolerance
     from patchwright.models.tree import Tree
     from patchwright.models.triangulation import Triangulation
-    from patchwright.repair.block_faces import block_faces
-    from patchwright.repair.blocks import single_blocks
-    from patchwright.repair.patch_fit import Target
-    from patchwright.repair.quad_layout import quad_layout
-    from patchwright.repair.resurface import resurface
+    from patchwright.repair.layout.blocks import single_blocks
+    from patchwright.repair.layout.quad_layout import quad_layout
+    from patchwright.repair.patches.block_faces import block_faces
+    from patchwright.repair.patches.patch_fit import Target
+    from patchwright.repair.patches.resurface import resurface
 
     body = _noisy_torus()
     layout = quad_layout(body, target=60)

@@ -74,9 +74,9 @@ def repair(
         result = replace(result, ledger=(*task.entries, *result.ledger))
     else:
         from patchwright.repair.aside import with_aside
-        from patchwright.repair.given_layout import layout_of
+        from patchwright.repair.layout.given_layout import layout_of
+        from patchwright.repair.layout.quad_layout import QuadLayout
         from patchwright.repair.mesh_route import repair_mesh
-        from patchwright.repair.quad_layout import QuadLayout
 
         given = layout if isinstance(layout, str) else layout_of(layout, task.limits)
         result = repair_mesh(
@@ -124,7 +124,7 @@ def plan_repair(
     if task.model.is_cad and scope == "least":
         made = _cad(task, openings, say, time_limit)
         return plan_of(task.model.source, (*task.entries, *made.ledger), size, made.problems, reasons)
-    from patchwright.repair.mend import mend
+    from patchwright.repair.mender.mend import mend
     from patchwright.repair.mesh_route import mending_ledger, problems_of
 
     mended = mend(task.body.triangulation, task.limits, openings=openings, decisions=task.decisions, progress=say)
@@ -217,7 +217,7 @@ def _body(model: Assembly, around: Surroundings, limits: Tolerance) -> tuple[Ass
 def _cad(task: _Task, openings: str, say: Progress, time_limit: float) -> Repaired:
     if not time_limit > 0.0:
         raise ParameterError(f"a time limit must be a positive number of seconds, got {time_limit!r}")
-    from patchwright.repair.cad_route import repair_cad
+    from patchwright.repair.cad.route import repair_cad
 
     return repair_cad(
         task.model,

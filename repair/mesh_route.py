@@ -19,27 +19,27 @@ from patchwright.models.errors import GeometryError
 from patchwright.models.tolerance import Tolerance
 from patchwright.models.tree import Tree
 from patchwright.models.triangulation import Triangulation
-from patchwright.repair.block_faces import BlockFaces, block_faces
-from patchwright.repair.block_grid import block_grid
-from patchwright.repair.blocks import Blocks, find_blocks, single_blocks, smallest_corner
-from patchwright.repair.cad_ground import ground_of, measured, on_model, true_entry
+from patchwright.repair.cad.ground import ground_of, measured, on_model, true_entry
+from patchwright.repair.cad.true_ground import TrueGround
 from patchwright.repair.decisions import Decisions
 from patchwright.repair.deviation import Deviation
-from patchwright.repair.faceting import faceting
-from patchwright.repair.joins import smooth_edges
-from patchwright.repair.last_resort import wrapped
-from patchwright.repair.mend import BRIDGED, CUT, KEPT, Mended, mend
-from patchwright.repair.mended import LEFT_OUT
-from patchwright.repair.network import PatchNetwork
-from patchwright.repair.network_seams import measure
-from patchwright.repair.patch_crossings import crossing_entries
-from patchwright.repair.patch_fit import Target
-from patchwright.repair.quad_layout import QuadLayout, quad_layout
+from patchwright.repair.layout.block_grid import block_grid
+from patchwright.repair.layout.blocks import Blocks, find_blocks, single_blocks, smallest_corner
+from patchwright.repair.layout.faceting import faceting
+from patchwright.repair.layout.quad_layout import QuadLayout, quad_layout
+from patchwright.repair.mender.last_resort import wrapped
+from patchwright.repair.mender.mend import BRIDGED, CUT, KEPT, Mended, mend
+from patchwright.repair.mender.mended import LEFT_OUT
+from patchwright.repair.patches.block_faces import BlockFaces, block_faces
+from patchwright.repair.patches.joins import smooth_edges
+from patchwright.repair.patches.network import PatchNetwork
+from patchwright.repair.patches.network_seams import measure
+from patchwright.repair.patches.patch_crossings import crossing_entries
+from patchwright.repair.patches.patch_fit import Target
+from patchwright.repair.patches.resurface import resurface
+from patchwright.repair.patches.seam_curvature import curvature_jumps
 from patchwright.repair.result import Face, LedgerEntry, Point, Problem, Progress, Repaired, Rung, Seam, Verdict
-from patchwright.repair.resurface import resurface
-from patchwright.repair.seam_curvature import curvature_jumps
 from patchwright.repair.symmetry import settled
-from patchwright.repair.true_ground import TrueGround
 
 COVERAGE_GOAL = 0.99  # share of the area, both ways, within the fit tolerance; below it a result has not converged
 COVERAGE_LEAST = 0.95  # below it a result is refused

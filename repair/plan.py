@@ -14,7 +14,7 @@ from typing import Any
 from patchwright.models.errors import CorruptFile
 from patchwright.repair.decisions import CARRIED, OPTIONAL
 from patchwright.repair.fingerprint import Fingerprint, fingerprint, labels, matched
-from patchwright.repair.mended import LEFT_OUT
+from patchwright.repair.mender.mended import LEFT_OUT
 from patchwright.repair.result import LedgerEntry, Problem, Rung
 
 VERSION = 1

@@ -13,7 +13,7 @@ from patchwright.models.triangulation import Triangulation
 from patchwright.repair.deviation import Deviation
 
 if TYPE_CHECKING:
-    from patchwright.repair.network import PatchNetwork
+    from patchwright.repair.patches.network import PatchNetwork
     from patchwright.repair.regions import Region
 
 Progress = Callable[[str, float], None]

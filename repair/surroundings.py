@@ -161,7 +161,7 @@ class Pieces:
 
 def pieces_of(mesh: Triangulation, distance: float) -> Pieces:
     """The components of a triangulation whose vertices within a distance are one."""
-    from patchwright.repair.weld import weld
+    from patchwright.repair.mender.weld import weld
 
     if not len(mesh):
         return _boxed(mesh, np.zeros(0, dtype=np.int64))
@@ -185,7 +185,7 @@ def _by_part(mesh: Triangulation, pieces: Pieces) -> Pieces:
 def _boxed(mesh: Triangulation, label: IntArray) -> Pieces:
     if not len(mesh):
         return Pieces(label, np.zeros((0, 3)), np.zeros((0, 3)))
-    from patchwright.repair._rims_kernel import boxes_of
+    from patchwright.repair.mender._rims_kernel import boxes_of
 
     boxes = boxes_of(mesh.vertices, mesh.triangles, label, int(label.max()) + 1)
     return Pieces(label, boxes[:, :3].copy(), boxes[:, 3:].copy())
@@ -283,7 +283,7 @@ def _plane(model: Assembly, word: str) -> tuple[SymmetryPlane, BoolArray]:
 
 def _around(mesh: Triangulation, pieces: Pieces, point: Array) -> BoolArray:
     """(m,) triangles of the pieces whose winding number round a point is not zero."""
-    from patchwright.repair.untangle import winding
+    from patchwright.repair.mender.untangle import winding
 
     maybe = ((pieces.low < point) & (point < pieces.high)).all(axis=1)
     around = np.zeros(len(mesh), dtype=np.bool_)

@@ -9,9 +9,9 @@ import numpy as np
 from patchwright.models.arrays import Array, IntArray, frozen
 from patchwright.models.triangulation import Triangulation
 from patchwright.repair.checks.examination import Examination
-from patchwright.repair.edge_curves import EdgeCurves
-from patchwright.repair.network import PatchNetwork
-from patchwright.repair.patch_nets import PatchNets
+from patchwright.repair.patches.edge_curves import EdgeCurves
+from patchwright.repair.patches.network import PatchNetwork
+from patchwright.repair.patches.patch_nets import PatchNets
 from patchwright.repair.surroundings import SymmetryPlane
 
 

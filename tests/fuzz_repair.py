@@ -30,8 +30,8 @@ from patchwright.models.tolerance import Tolerance
 from patchwright.models.tree import Tree
 from patchwright.models.triangulation import Triangulation
 from patchwright.models.winding import winding_number
-from patchwright.repair._clean_kernel import triangle_heights
-from patchwright.repair.mend import mend
+from patchwright.repair.mender._clean_kernel import triangle_heights
+from patchwright.repair.mender.mend import mend
 from patchwright.ssi.mesh_mesh import mesh_intersection
 from patchwright.ssi.mesh_topology import TRANSVERSAL
 

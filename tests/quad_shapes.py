@@ -6,8 +6,8 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from patchwright.repair.blocks import Blocks
-from patchwright.repair.quad_layout import QuadLayout
+from patchwright.repair.layout.blocks import Blocks
+from patchwright.repair.layout.quad_layout import QuadLayout
 
 
 class SphereTarget:

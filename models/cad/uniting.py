@@ -1,6 +1,6 @@
 """The union of closed bodies by the CAD kernel's Boolean operation, with what became of every face.
 
-The kernel is trusted with nothing: which faces lie where is for the caller to prove (`repair.cad_union`), and seams are
+The kernel is trusted with nothing: which faces lie where is for the caller to prove (`repair.cad.union`), and seams are
 measured surface to surface like any others.
 """
 

@@ -12,13 +12,13 @@ from patchwright.models.adjacency import Adjacency
 from patchwright.models.arrays import Array, BoolArray, IntArray
 from patchwright.models.assembly import Part
 from patchwright.models.triangulation import Triangulation
-from patchwright.repair.cad_bodies import body_labels, closed_bodies, engulfed
+from patchwright.repair.cad.bodies import body_labels, closed_bodies, engulfed
+from patchwright.repair.cad.sag import sags
 from patchwright.repair.checks.crossing_curves import crossing_curves, total_length
 from patchwright.repair.checks.examination import Examination, box_of
 from patchwright.repair.checks.regions import plural
 from patchwright.repair.checks.registry import Finding, check
 from patchwright.repair.diagnosis import Defect
-from patchwright.repair.sag import sags
 
 SURE = 3.0  # times the sag of both faces' triangles: deeper is a crossing of the surfaces themselves
 SAMPLES = 1_000  # points of a body that are looked for inside others

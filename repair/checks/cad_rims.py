@@ -16,8 +16,8 @@ from patchwright.repair.checks.regions import plural
 from patchwright.repair.checks.registry import Finding, check
 from patchwright.repair.checks.rims import describe, most_of_each, rim_groups
 from patchwright.repair.diagnosis import Defect
-from patchwright.repair.rim_edges import RimEdges
-from patchwright.repair.rims import Rim, judge_loops
+from patchwright.repair.mender.rim_edges import RimEdges
+from patchwright.repair.mender.rims import Rim, judge_loops
 
 CHORDS = 16  # per free edge, at least
 PER_SPAN, MOST_CHORDS = 8, 256  # chords per span of its curve, and at most
@@ -220,7 +220,7 @@ def free_edge_reach(topology: Topology, free: IntArray) -> Array:
 
     What sewing at that distance would close; it does not ask for equal ends, so an edge may lie on two others.
     """
-    from patchwright.repair._rims_kernel import nearest_other
+    from patchwright.repair.mender._rims_kernel import nearest_other
 
     if not len(free):
         return np.zeros(0)

@@ -13,8 +13,8 @@ from dataclasses import replace
 import numpy as np
 
 from patchwright.models.arrays import Array, IntArray
-from patchwright.repair.rim_edges import RimEdges
-from patchwright.repair.rims import Rim
+from patchwright.repair.mender.rim_edges import RimEdges
+from patchwright.repair.mender.rims import Rim
 
 BESIDE = 0.1  # of the smaller rim's diameter: rims nearer than this all along run beside each other
 TOWARDS = 0.5  # cosine between the way a face leaves its rim and the way to the other rim

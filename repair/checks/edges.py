@@ -35,7 +35,7 @@ def edges(exam: Examination) -> Finding:
 
 def _curve(exam: Examination) -> list[dict[str, float | int]]:
     """Free edges after welding at each of `SHARES` of the diagonal."""
-    from patchwright.repair.weld import free_edge_curve
+    from patchwright.repair.mender.weld import free_edge_curve
 
     distances = np.array(SHARES) * exam.diagonal
     counts = (

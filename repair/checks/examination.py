@@ -15,10 +15,10 @@ from patchwright.models.tolerance import Tolerance
 from patchwright.models.triangulation import Triangulation
 
 if TYPE_CHECKING:
-    from patchwright.repair.orient import Oriented
-    from patchwright.repair.rims import Rim
+    from patchwright.repair.mender.orient import Oriented
+    from patchwright.repair.mender.rims import Rim
+    from patchwright.repair.mender.weld import Copies
     from patchwright.repair.surroundings import Surroundings
-    from patchwright.repair.weld import Copies
 
 CURVE_END = 1e-3  # of the diagonal: where the curve of free edges ends
 SMALL_OPENING = 0.05  # of the square root of a component's area: it bounds a body all the same
@@ -45,7 +45,7 @@ class Examination:
     @cached_property
     def merged(self) -> Triangulation:
         """Vertices with equal coordinates merged."""
-        from patchwright.repair.weld import weld
+        from patchwright.repair.mender.weld import weld
 
         return weld(self.raw, 0.0).triangulation
 
@@ -67,14 +67,14 @@ class Examination:
     @cached_property
     def copies(self) -> Copies:
         """Free edges of `raw` that may be copies of each other, as far apart as any check looks for them."""
-        from patchwright.repair.weld import Copies, reach_of
+        from patchwright.repair.mender.weld import Copies, reach_of
 
         return Copies.of(self.raw, max(reach_of(self.tolerance), CURVE_END * self.diagonal))
 
     @cached_property
     def weld_distance(self) -> tuple[float, str]:
         """The distance at which copies of one point are merged, and why; 0 when nothing is open."""
-        from patchwright.repair.weld import weld_distance
+        from patchwright.repair.mender.weld import weld_distance
 
         if not self.open_edges:
             return 0.0, "no edge is free"
@@ -83,7 +83,7 @@ class Examination:
     @cached_property
     def welded(self) -> Triangulation:
         """Copies of one point merged."""
-        from patchwright.repair.weld import weld_shown
+        from patchwright.repair.mender.weld import weld_shown
 
         distance = self.weld_distance[0]
         if distance <= 0.0:
@@ -98,7 +98,7 @@ class Examination:
     @cached_property
     def duplicate(self) -> BoolArray:
         """(m,) triangles of `welded` over the same three vertices as an earlier one."""
-        from patchwright.repair._weld_kernel import merge_exact
+        from patchwright.repair.mender._weld_kernel import merge_exact
 
         key = np.sort(self.welded.triangles, axis=1)
         return np.asarray((merge_exact(key) != np.arange(len(key))) & ~self.collapsed)
@@ -106,7 +106,7 @@ class Examination:
     @cached_property
     def flat(self) -> BoolArray:
         """(m,) triangles of `raw` with three corners but no height beyond the rounding of their coordinates."""
-        from patchwright.repair._clean_kernel import triangle_heights
+        from patchwright.repair.mender._clean_kernel import triangle_heights
 
         height = triangle_heights(self.raw.vertices, self.raw.triangles)
         rounding = 4.0 * float(np.finfo(np.float64).eps) * float(np.abs(self.raw.bounds).max())
@@ -127,7 +127,7 @@ class Examination:
 
     @cached_property
     def _cleaned(self) -> tuple[Triangulation, IntArray]:
-        from patchwright.repair.clean import drop_collapsed, drop_duplicates
+        from patchwright.repair.mender.clean import drop_collapsed, drop_duplicates
 
         if not (self.collapsed.any() or self.duplicate.any() or self.flat.any()):
             return self.welded, np.arange(len(self.welded))
@@ -162,14 +162,14 @@ class Examination:
     @cached_property
     def oriented(self) -> Oriented:
         """`body` with a consistent, outward orientation."""
-        from patchwright.repair.orient import orient
+        from patchwright.repair.mender.orient import orient
 
         return orient(self.body)
 
     @cached_property
     def rims(self) -> tuple[Rim, ...]:
         """The rims of `oriented`."""
-        from patchwright.repair.rims import classify_rims
+        from patchwright.repair.mender.rims import classify_rims
 
         turned = self.oriented.flipped.any()
         adjacency = Adjacency.of(self.oriented.triangulation) if turned else self.body_adjacency
@@ -201,14 +201,14 @@ class Examination:
     @cached_property
     def crossing_pairs(self) -> IntArray:
         """(k, 2) pairs of triangles of `body` that pass through each other."""
-        from patchwright.repair.crossings import crossing_pairs
+        from patchwright.repair.mender.crossings import crossing_pairs
 
         return crossing_pairs(self.body, self.tolerance.gap)
 
     @cached_property
     def tessellation_crossings(self) -> IntArray:
         """(k, 2) pairs of triangles of `merged` that pass through each other."""
-        from patchwright.repair.crossings import crossing_pairs
+        from patchwright.repair.mender.crossings import crossing_pairs
 
         return crossing_pairs(self.merged, self.tolerance.gap)
 

@@ -9,7 +9,7 @@ from patchwright.repair.checks.examination import Examination, box_of
 from patchwright.repair.checks.regions import plural, regional
 from patchwright.repair.checks.registry import Finding, check
 from patchwright.repair.diagnosis import Defect, Severity
-from patchwright.repair.untangle import winding
+from patchwright.repair.mender.untangle import winding
 
 
 @check("orientation", looks="mesh", kinds=("flipped",))

@@ -12,7 +12,7 @@ from patchwright.repair.checks.regions import MOST, plural
 from patchwright.repair.checks.registry import Finding, check
 from patchwright.repair.checks.rims_ahead import Ahead, facing_surfaces
 from patchwright.repair.diagnosis import Defect, Severity
-from patchwright.repair.rims import Rim
+from patchwright.repair.mender.rims import Rim
 
 SLIVER = 8  # edges: a hole of more is no sliver at a t-junction
 

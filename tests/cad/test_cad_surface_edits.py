@@ -14,7 +14,7 @@ from patchwright.models.knots import greville
 from patchwright.models.rigid_motion import RigidMotion
 from patchwright.models.samples.cube_sphere import cube_sphere_patches
 from patchwright.models.topology import EdgeUse, Topology
-from patchwright.repair.pcurves import below, spline
+from patchwright.repair.cad.pcurves import below, spline
 
 RNG = np.random.default_rng(3)
 KNOTS = np.array([0.0, 0, 0, 0, 0.3, 0.7, 1, 1, 1, 1])

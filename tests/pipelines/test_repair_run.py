@@ -125,7 +125,7 @@ def test_a_given_layout_is_used():
 
 
 def test_the_layout_written_gives_the_same_patches_again(study):
-    from patchwright.repair.layout_file import load_layout
+    from patchwright.repair.layout.layout_file import load_layout
 
     layout = load_layout(study.folder / "layout.json")
     again = repair(read(study.source), layout=layout)

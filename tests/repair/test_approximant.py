@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from patchwright.models.errors import ParameterError
-from patchwright.repair.approximant import TWISTS, bicubic_approximant
+from patchwright.repair.patches.approximant import TWISTS, bicubic_approximant
 
 
 def wavy(u, v):

@@ -14,14 +14,14 @@ from patchwright.models import Assembly
 from patchwright.models.assembly import Part
 from patchwright.models.io import read, write
 from patchwright.models.triangulation import Triangulation
-from patchwright.repair.block_cuts import cut_along, cut_apart
-from patchwright.repair.block_faces import JOINT, block_faces
-from patchwright.repair.blocks import find_blocks, single_blocks
-from patchwright.repair.edge_curves import EdgeCurves
-from patchwright.repair.joins import seam_angles, side_normals
-from patchwright.repair.network import PatchNetwork
-from patchwright.repair.patch_nets import PatchNets, coons_nets, sides
-from patchwright.repair.quad_layout import QuadLayout
+from patchwright.repair.layout.block_cuts import cut_along, cut_apart
+from patchwright.repair.layout.blocks import find_blocks, single_blocks
+from patchwright.repair.layout.quad_layout import QuadLayout
+from patchwright.repair.patches.block_faces import JOINT, block_faces
+from patchwright.repair.patches.edge_curves import EdgeCurves
+from patchwright.repair.patches.joins import seam_angles, side_normals
+from patchwright.repair.patches.network import PatchNetwork
+from patchwright.repair.patches.patch_nets import PatchNets, coons_nets, sides
 
 
 def network_on(layout: QuadLayout, *, seed: int = 0, bumps: float = 0.0) -> PatchNetwork:

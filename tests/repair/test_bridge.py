@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from patchwright.models import Triangulation
-from patchwright.repair.bridge import borders_of, bridge, facing_pairs, inner_share
+from patchwright.repair.mender.bridge import borders_of, bridge, facing_pairs, inner_share
 
 
 def plate_with_hole(sides: int) -> Triangulation:

@@ -20,7 +20,7 @@ from oracles_cad_damage import (
 
 from patchwright.models.io import read, write
 from patchwright.repair import repair
-from patchwright.repair.cad_copies import without_copies
+from patchwright.repair.cad.copies import without_copies
 from patchwright.repair.result import Rung, Verdict
 
 FACES = faces_of(rounded_box())

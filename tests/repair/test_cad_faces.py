@@ -16,13 +16,13 @@ from patchwright.models.cad.editing import compacted, with_loops
 from patchwright.models.errors import ParameterError
 from patchwright.models.io import read, write
 from patchwright.repair import repair
-from patchwright.repair.cad_draft import Draft, Limits
-from patchwright.repair.coons_surface import coons_surface
-from patchwright.repair.deadline import Deadline
-from patchwright.repair.height_surface import Frame, Rim, height_surface
+from patchwright.repair.cad.deadline import Deadline
+from patchwright.repair.cad.draft import Draft, Limits
+from patchwright.repair.cad.height_surface import Frame, Rim, height_surface
+from patchwright.repair.cad.retrace import retrace
+from patchwright.repair.cad.turned_loops import turned_loops
+from patchwright.repair.patches.coons_surface import coons_surface
 from patchwright.repair.result import Rung, Verdict
-from patchwright.repair.retrace import retrace
-from patchwright.repair.turned_loops import turned_loops
 
 DIAGONAL = float(np.linalg.norm(SIZES))
 

@@ -13,10 +13,10 @@ from OCP.TopoDS import TopoDS_Compound
 from patchwright.models.cad.seams import measure_seams
 from patchwright.models.io import read
 from patchwright.repair import diagnose, repair
-from patchwright.repair.cad_bodies import closed_bodies
-from patchwright.repair.cad_union import united
-from patchwright.repair.deadline import Deadline
-from patchwright.repair.face_steps import free_edges
+from patchwright.repair.cad.bodies import closed_bodies
+from patchwright.repair.cad.deadline import Deadline
+from patchwright.repair.cad.face_steps import free_edges
+from patchwright.repair.cad.union import united
 
 BALL = 4.0
 

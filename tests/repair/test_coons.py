@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from patchwright.models.errors import GeometryError
-from patchwright.repair.coons import check_corners, coons_grid, offset_distance, offset_normals
+from patchwright.repair.patches.coons import check_corners, coons_grid, offset_distance, offset_normals
 
 
 def sides_of(surface, m, n):

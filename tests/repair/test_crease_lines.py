@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from quad_shapes import layout_from_quads
 
-from patchwright.repair.crease_lines import MOST_KINK, along_creases
-from patchwright.repair.edge_curves import fit_edges
-from patchwright.repair.joins import edge_end_normals
-from patchwright.repair.stars import leaving
+from patchwright.repair.patches.crease_lines import MOST_KINK, along_creases
+from patchwright.repair.patches.edge_curves import fit_edges
+from patchwright.repair.patches.joins import edge_end_normals
+from patchwright.repair.patches.stars import leaving
 
 
 def roof(crease, bend, tilt, scale=1.0, swap=False):

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from patchwright.models import Tolerance, Triangulation
-from patchwright.repair.crossings import crossing_pairs, crossing_pairs_after
-from patchwright.repair.mended import Work
+from patchwright.repair.mender.crossings import crossing_pairs, crossing_pairs_after
+from patchwright.repair.mender.mended import Work
 
 
 def two_spheres() -> Triangulation:

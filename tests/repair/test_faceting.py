@@ -7,7 +7,7 @@ import pytest
 
 from patchwright.models import Triangulation
 from patchwright.models.samples import cube
-from patchwright.repair.faceting import faceting
+from patchwright.repair.layout.faceting import faceting
 
 
 def cylinder(sides, height=1.0, scale=1.0):

@@ -10,8 +10,8 @@ from layout_shapes import cube, cylinder, jittered, moved, plate_with_hole, sphe
 
 from patchwright.models import GeometryError, Triangulation
 from patchwright.models.adjacency import Adjacency
-from patchwright.repair.feature_cleaning import cut_teeth
-from patchwright.repair.features import BOUNDARY, FOLLOWED, SHARP, find_features
+from patchwright.repair.layout.feature_cleaning import cut_teeth
+from patchwright.repair.layout.features import BOUNDARY, FOLLOWED, SHARP, find_features
 
 
 @pytest.mark.parametrize("intervals", [1, 5])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from patchwright.models.errors import ParameterError
-from patchwright.repair.filling import METHODS, FillStatus, fill
+from patchwright.repair.patches.filling import METHODS, FillStatus, fill
 
 SIDE = 41
 

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from layout_shapes import cube, plate_with_hole, sphere, torus
 
-import patchwright.repair.quad_layout as quad_layout_module
+import patchwright.repair.layout.quad_layout as quad_layout_module
 from patchwright.models.errors import GeometryError
-from patchwright.repair.features import find_features
-from patchwright.repair.halving import face_costs, halved
-from patchwright.repair.pairing import PIECES, _split_faces, pair
-from patchwright.repair.remesh import remesh
+from patchwright.repair.layout.features import find_features
+from patchwright.repair.layout.halving import face_costs, halved
+from patchwright.repair.layout.pairing import PIECES, _split_faces, pair
+from patchwright.repair.layout.remesh import remesh
 
 
 def coarse_of(shape, size):

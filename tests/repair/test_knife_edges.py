@@ -9,11 +9,11 @@ from quad_shapes import layout_from_quads
 from patchwright.models.tolerance import Tolerance
 from patchwright.models.tree import Tree
 from patchwright.models.triangulation import Triangulation
-from patchwright.repair.edge_fit import fit_edge_curves
-from patchwright.repair.knife_edges import knife_edges
-from patchwright.repair.patch_fit import Target, fit_group
-from patchwright.repair.patch_nets import PatchNets, sides
-from patchwright.repair.resurface import resurface
+from patchwright.repair.patches.edge_fit import fit_edge_curves
+from patchwright.repair.patches.knife_edges import knife_edges
+from patchwright.repair.patches.patch_fit import Target, fit_group
+from patchwright.repair.patches.patch_nets import PatchNets, sides
+from patchwright.repair.patches.resurface import resurface
 
 
 def rim(radius, half=10.0, scale=1.0):

@@ -9,7 +9,7 @@ import pytest
 from quad_shapes import sphere_layout
 
 from patchwright.models.errors import CorruptFile, GeometryError
-from patchwright.repair.layout_file import load_layout, save_layout
+from patchwright.repair.layout.layout_file import load_layout, save_layout
 
 FIELDS = ("vertices", "quads", "quad_edges", "edge_reversed", "edges", "edge_quads", "sharp", "boundary", "tags")
 

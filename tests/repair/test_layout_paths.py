@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from patchwright.models.triangulation import Triangulation
-from patchwright.repair import _surface_walk_kernel as walker
-from patchwright.repair.features import find_features
-from patchwright.repair.layout_paths import PATH_POINTS, _go_round, on_curves
-from patchwright.repair.remesh import _start, ground_of
+from patchwright.repair.layout import _surface_walk_kernel as walker
+from patchwright.repair.layout.features import find_features
+from patchwright.repair.layout.layout_paths import PATH_POINTS, _go_round, on_curves
+from patchwright.repair.layout.remesh import _start, ground_of
 
 AROUND, UP = 48, 24
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from quad_shapes import layout_from_quads
 
-from patchwright.repair.edge_curves import fit_edges
-from patchwright.repair.leg_room import ROOM, leg_room
-from patchwright.repair.stars import LEAST_CORNER, corner_angles, leaving
-from patchwright.repair.straight import opposite_ends, straighten
+from patchwright.repair.patches.edge_curves import fit_edges
+from patchwright.repair.patches.leg_room import ROOM, leg_room
+from patchwright.repair.patches.stars import LEAST_CORNER, corner_angles, leaving
+from patchwright.repair.patches.straight import opposite_ends, straighten
 
 
 def bent_strips(width, *, scale=1.0, kink=0.15):

@@ -16,12 +16,12 @@ from patchwright.models.nurbs_surface import NurbsSurface
 from patchwright.models.samples import cube, sphere, wavy_patch
 from patchwright.models.triangulation import Triangulation, concatenate
 from patchwright.pipelines.paper_patches import approximate_case, patch_cases
-from patchwright.repair.approximant import bicubic_approximant
-from patchwright.repair.local_patch import Status, approximate
-from patchwright.repair.patch_ground import PatchGround
-from patchwright.repair.patch_sides import Sides, edge_side, iso_side, laid, polyline, through
-from patchwright.repair.side_paths import intersection_side, path_along, section_side
-from patchwright.repair.tensor_fit import tensor_fit
+from patchwright.repair.patches.approximant import bicubic_approximant
+from patchwright.repair.patches.local_patch import Status, approximate
+from patchwright.repair.patches.patch_ground import PatchGround
+from patchwright.repair.patches.patch_sides import Sides, edge_side, iso_side, laid, polyline, through
+from patchwright.repair.patches.side_paths import intersection_side, path_along, section_side
+from patchwright.repair.patches.tensor_fit import tensor_fit
 
 
 def wavy() -> tuple[NurbsSurface, Assembly]:

@@ -12,8 +12,8 @@ from patchwright.models import ParameterError, Tolerance, Triangulation
 from patchwright.models.adjacency import Adjacency
 from patchwright.models.samples import DefectCase, eight_defects
 from patchwright.models.tree import Tree
-from patchwright.repair.crossings import crossing_pairs
-from patchwright.repair.mend import BRIDGED, CUT, KEPT, Mended, mend
+from patchwright.repair.mender.crossings import crossing_pairs
+from patchwright.repair.mender.mend import BRIDGED, CUT, KEPT, Mended, mend
 
 
 def mended(dirty: Triangulation, openings: str = "close") -> Mended:

@@ -13,8 +13,8 @@ from patchwright.models.samples.high_lift import half_fuselage
 from patchwright.models.samples.sample import Sample
 from patchwright.repair import Domain, repair
 from patchwright.repair.decisions import Decisions
-from patchwright.repair.mend import mend
-from patchwright.repair.mended import Mended
+from patchwright.repair.mender.mend import mend
+from patchwright.repair.mender.mended import Mended
 from patchwright.repair.surroundings import surroundings
 
 AT = 0.6  # where the slits are, in the cylindrical middle

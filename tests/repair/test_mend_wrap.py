@@ -8,9 +8,9 @@ from patchwright.models import Tolerance, Triangulation
 from patchwright.models.adjacency import Adjacency
 from patchwright.models.tree import Tree
 from patchwright.models.winding import winding_number
-from patchwright.repair.crossings import crossing_pairs
-from patchwright.repair.mend import BRIDGED, CUT, KEPT, mend
-from patchwright.repair.wrap import wrap
+from patchwright.repair.mender.crossings import crossing_pairs
+from patchwright.repair.mender.mend import BRIDGED, CUT, KEPT, mend
+from patchwright.repair.mender.wrap import wrap
 
 
 def klein_bottle(n: int = 24) -> Triangulation:

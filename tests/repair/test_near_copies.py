@@ -10,9 +10,9 @@ from patchwright.models import Tolerance, Triangulation
 from patchwright.models.adjacency import Adjacency
 from patchwright.models.samples import duplicated, unmerged
 from patchwright.models.samples.splitting import degenerate, t_junctions
-from patchwright.repair.clean import drop_hanging_flats
-from patchwright.repair.mend import mend
-from patchwright.repair.near_copies import near_copies
+from patchwright.repair.mender.clean import drop_hanging_flats
+from patchwright.repair.mender.mend import mend
+from patchwright.repair.mender.near_copies import near_copies
 
 
 @pytest.mark.parametrize("jitter", [0.0, 1e-7, 1e-4])

@@ -11,7 +11,7 @@ import pytest
 from patchwright.models import Assembly, Tolerance, Triangulation, samples
 from patchwright.models.io import read
 from patchwright.repair import diagnose, repair
-from patchwright.repair.mend import KEPT, mend
+from patchwright.repair.mender.mend import KEPT, mend
 
 SHAPES = {
     "sphere": samples.sphere,

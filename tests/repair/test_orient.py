@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from patchwright.models import Triangulation
-from patchwright.repair.orient import orient
+from patchwright.repair.mender.orient import orient
 
 
 @pytest.mark.parametrize("share", [0.0, 0.4, 0.9, 1.0])

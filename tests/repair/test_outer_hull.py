@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from patchwright.models import Triangulation
-from patchwright.repair.outer_hull import outer_hull
+from patchwright.repair.mender.outer_hull import outer_hull
 
 
 def hull_of(*parts: Triangulation):  # type: ignore[no-untyped-def]

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from layout_shapes import cube, plate_with_hole, sphere, torus
 
-from patchwright.repair._quad_kernel import match
-from patchwright.repair.features import find_features
-from patchwright.repair.pairing import UNPAIRED, pair, pair_score, part_doublets
-from patchwright.repair.quad_smooth import scaled_jacobians, smooth
-from patchwright.repair.remesh import remesh
+from patchwright.repair.layout._quad_kernel import match
+from patchwright.repair.layout.features import find_features
+from patchwright.repair.layout.pairing import UNPAIRED, pair, pair_score, part_doublets
+from patchwright.repair.layout.quad_smooth import scaled_jacobians, smooth
+from patchwright.repair.layout.remesh import remesh
 
 
 def coarse_of(shape, size):

@@ -8,8 +8,8 @@ import pytest
 from patchwright.models import Assembly, Triangulation, samples
 from patchwright.models.arrays import frozen
 from patchwright.repair import repair
-from patchwright.repair.network import PatchNetwork
-from patchwright.repair.patch_crossings import crossing_entries, patch_crossings
+from patchwright.repair.patches.network import PatchNetwork
+from patchwright.repair.patches.patch_crossings import crossing_entries, patch_crossings
 
 
 @pytest.fixture(scope="module")

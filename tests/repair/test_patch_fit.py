@@ -10,9 +10,9 @@ from patchwright.models import Assembly, Cylinder, Part, Tolerance, Triangulatio
 from patchwright.models.adjacency import Adjacency
 from patchwright.models.tree import Tree
 from patchwright.models.triangulation import concatenate
-from patchwright.repair.patch_fit import Target
-from patchwright.repair.resurface import resurface
-from patchwright.repair.true_ground import TrueGround, TrueSurfaces
+from patchwright.repair.cad.true_ground import TrueGround, TrueSurfaces
+from patchwright.repair.patches.patch_fit import Target
+from patchwright.repair.patches.resurface import resurface
 
 
 def flat(height, n=24, hole=0.0):

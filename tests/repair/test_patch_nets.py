@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from patchwright.repair.coons import coons_grid
-from patchwright.repair.patch_nets import PatchNets, coons_nets, evaluate, folds
-from patchwright.repair.spline_space import collocation, greville, uniform_collocation
+from patchwright.repair.patches.coons import coons_grid
+from patchwright.repair.patches.patch_nets import PatchNets, coons_nets, evaluate, folds
+from patchwright.repair.patches.spline_space import collocation, greville, uniform_collocation
 
 
 def boundary(m, n):

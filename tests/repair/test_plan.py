@@ -15,7 +15,7 @@ from patchwright.models.io import read, write
 from patchwright.models.samples.cube_sphere import cube_sphere_patches
 from patchwright.repair import Plan, plan_repair, repair
 from patchwright.repair.ladder import _task
-from patchwright.repair.mend import mend
+from patchwright.repair.mender.mend import mend
 from patchwright.repair.mesh_route import mending_ledger
 from patchwright.repair.plan import compared
 from patchwright.repair.result import Rung, Verdict

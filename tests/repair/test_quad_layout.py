@@ -9,8 +9,8 @@ import pytest
 from layout_shapes import cube, cylinder, jittered, moved, plate_with_hole, sphere, torus, wedge
 
 from patchwright.models import EngineError, GeometryError, ParameterError, Triangulation
-from patchwright.repair import quadriflow
-from patchwright.repair.quad_layout import quad_layout
+from patchwright.repair.layout import quadriflow
+from patchwright.repair.layout.quad_layout import quad_layout
 
 SHAPES = {
     "cube": cube(3),

@@ -8,8 +8,8 @@ import pytest
 from patchwright.models import Tolerance
 from patchwright.models.io import read
 from patchwright.models.samples import demo_aircraft
-from patchwright.repair.mend import mend
-from patchwright.repair.quad_layout import quad_layout
+from patchwright.repair.layout.quad_layout import quad_layout
+from patchwright.repair.mender.mend import mend
 
 
 def mended(triangulation):

@@ -9,14 +9,14 @@ import pytest
 from layout_shapes import cube, cylinder, moved, plate_with_hole, sphere, torus, wedge
 
 from patchwright.models import Triangulation
-from patchwright.repair._pattern_kernel import CUT, GRID, STAR, fill, patterns
-from patchwright.repair.blocks import find_blocks
-from patchwright.repair.features import find_features
-from patchwright.repair.pairing import pair
-from patchwright.repair.quad_layout import quad_layout
-from patchwright.repair.quad_smooth import scaled_jacobians, smooth
-from patchwright.repair.regular import closed, opened, regularize, unfolded
-from patchwright.repair.remesh import remesh
+from patchwright.repair.layout._pattern_kernel import CUT, GRID, STAR, fill, patterns
+from patchwright.repair.layout.blocks import find_blocks
+from patchwright.repair.layout.features import find_features
+from patchwright.repair.layout.pairing import pair
+from patchwright.repair.layout.quad_layout import quad_layout
+from patchwright.repair.layout.quad_smooth import scaled_jacobians, smooth
+from patchwright.repair.layout.regular import closed, opened, regularize, unfolded
+from patchwright.repair.layout.remesh import remesh
 
 
 def found_patterns(sides):

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from layout_shapes import cube, cylinder, plate_with_hole, sphere, torus, wedge
 
-from patchwright.repair.features import find_features
-from patchwright.repair.remesh import remesh
+from patchwright.repair.layout.features import find_features
+from patchwright.repair.layout.remesh import remesh
 
 SHAPES = {
     "cube": (cube(8), 2, 12.0),

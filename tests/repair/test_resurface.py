@@ -7,11 +7,11 @@ import pytest
 from quad_shapes import Marks, SphereTarget, sphere_layout
 
 from patchwright.models.tolerance import Tolerance
-from patchwright.repair.block_faces import block_faces
-from patchwright.repair.blocks import single_blocks
-from patchwright.repair.network_seams import measure
-from patchwright.repair.patch_fit import Target
-from patchwright.repair.resurface import resurface
+from patchwright.repair.layout.blocks import single_blocks
+from patchwright.repair.patches.block_faces import block_faces
+from patchwright.repair.patches.network_seams import measure
+from patchwright.repair.patches.patch_fit import Target
+from patchwright.repair.patches.resurface import resurface
 
 
 def network_of(n, fit, radius=1.0, slit=0.0):

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from patchwright.models import Triangulation
-from patchwright.repair.features import find_features
-from patchwright.repair.quad_layout import quad_layout
-from patchwright.repair.ridges import find_ridges, flanks
-from patchwright.repair.sizing import surface_curvature
+from patchwright.repair.layout.features import find_features
+from patchwright.repair.layout.quad_layout import quad_layout
+from patchwright.repair.layout.ridges import find_ridges, flanks
+from patchwright.repair.layout.sizing import surface_curvature
 
 RADIUS, DEPTH, SPAN = 0.02, 1.0, 4.0
 

@@ -8,7 +8,7 @@ from oracles_shells import blade, box, grid, hemisphere, merged, moved, soup, sp
 
 from patchwright.models import Triangulation
 from patchwright.models.io import read
-from patchwright.repair.rims import classify_rims
+from patchwright.repair.mender.rims import classify_rims
 
 
 def kinds(t: Triangulation) -> list[str]:

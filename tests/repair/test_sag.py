@@ -8,7 +8,7 @@ from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox, BRepPrimAPI_MakeSphere
 from OCP.STEPControl import STEPControl_StepModelType, STEPControl_Writer
 
 from patchwright.models.io import read
-from patchwright.repair.sag import sags
+from patchwright.repair.cad.sag import sags
 
 
 def written(path, shape):

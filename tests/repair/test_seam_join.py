@@ -15,14 +15,14 @@ from patchwright.models.cad import measure_seams, surface_difference
 from patchwright.models.interpolation import interpolate, interpolate_surface
 from patchwright.models.topology import EdgeUse
 from patchwright.models.triangulation import Triangulation
-from patchwright.repair.cad_draft import Draft, Limits
+from patchwright.repair.cad.draft import Draft, Limits
+from patchwright.repair.cad.face_sides import one_sided
+from patchwright.repair.cad.meeting import on_all, on_both
+from patchwright.repair.cad.pcurves import below, fitted
+from patchwright.repair.cad.seam_join import COARSE, FINE, join_seams
+from patchwright.repair.cad.seam_pieces import cut, seams
+from patchwright.repair.cad.side_strip import strip_sides
 from patchwright.repair.checks.bare_faces import completed
-from patchwright.repair.face_sides import one_sided
-from patchwright.repair.meeting import on_all, on_both
-from patchwright.repair.pcurves import below, fitted
-from patchwright.repair.seam_join import COARSE, FINE, join_seams
-from patchwright.repair.seam_pieces import cut, seams
-from patchwright.repair.side_strip import strip_sides
 
 LIMITS = Limits.of(2.0, math.inf)
 

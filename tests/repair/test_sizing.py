@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from layout_shapes import cube, cylinder, jittered, moved, sphere, torus, wedge
 
-from patchwright.repair.features import find_features
-from patchwright.repair.sizing import GRADING, STRIP_ASPECT, size_field, surface_curvature
+from patchwright.repair.layout.features import find_features
+from patchwright.repair.layout.sizing import GRADING, STRIP_ASPECT, size_field, surface_curvature
 
 
 @pytest.mark.parametrize("radius", [1e-3, 1.0, 50.0])

@@ -7,17 +7,17 @@ import pytest
 from quad_shapes import Marks, SphereTarget, layout_from_quads, sphere_layout
 
 from patchwright.models.tolerance import Tolerance
-from patchwright.repair.fair_fit import curve_fit, jumps
-from patchwright.repair.joins import regular_edges, seam_angles, sector_normals, side_normals
-from patchwright.repair.patch_fit import Target
-from patchwright.repair.patch_nets import PatchNets
-from patchwright.repair.resurface import resurface
-from patchwright.repair.seam_curvature import curvature_jumps, side_curvatures
-from patchwright.repair.smooth_joins import join, spoiled
-from patchwright.repair.spline_space import greville, uniform_collocation
-from patchwright.repair.stars import leaving
-from patchwright.repair.straight import opposite_ends, straighten
-from patchwright.repair.vertex_shapes import facing, vertex_forms, vertex_normals
+from patchwright.repair.patches.fair_fit import curve_fit, jumps
+from patchwright.repair.patches.joins import regular_edges, seam_angles, sector_normals, side_normals
+from patchwright.repair.patches.patch_fit import Target
+from patchwright.repair.patches.patch_nets import PatchNets
+from patchwright.repair.patches.resurface import resurface
+from patchwright.repair.patches.seam_curvature import curvature_jumps, side_curvatures
+from patchwright.repair.patches.smooth_joins import join, spoiled
+from patchwright.repair.patches.spline_space import greville, uniform_collocation
+from patchwright.repair.patches.stars import leaving
+from patchwright.repair.patches.straight import opposite_ends, straighten
+from patchwright.repair.patches.vertex_shapes import facing, vertex_forms, vertex_normals
 
 
 @pytest.fixture(scope="module")

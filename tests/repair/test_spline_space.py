@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from patchwright.repair import spline_space as space
+from patchwright.repair.patches import spline_space as space
 
 
 @pytest.mark.parametrize("cells", [1, 2, 3, 8, 16])

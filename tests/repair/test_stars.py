@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from quad_shapes import layout_from_quads
 
-from patchwright.repair.edge_curves import EdgeCurves, with_end_tangents
-from patchwright.repair.joins import sector_normals, smooth_edges
-from patchwright.repair.stars import LEAST_CORNER, corner_angles, leaving, spread
+from patchwright.repair.patches.edge_curves import EdgeCurves, with_end_tangents
+from patchwright.repair.patches.joins import sector_normals, smooth_edges
+from patchwright.repair.patches.stars import LEAST_CORNER, corner_angles, leaving, spread
 
 
 def star(angles, turn=None):

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from layout_shapes import moved, plate_with_hole, prism
 
-from patchwright.repair.feature_cleaning import SPECK_SHARE, not_specks
-from patchwright.repair.features import find_features
-from patchwright.repair.pairing import pair
-from patchwright.repair.quad_layout import quad_layout
-from patchwright.repair.quad_smooth import smooth
-from patchwright.repair.remesh import remesh
-from patchwright.repair.sizing import MOST_FEATURED, MOST_QUADS, size_field
+from patchwright.repair.layout.feature_cleaning import SPECK_SHARE, not_specks
+from patchwright.repair.layout.features import find_features
+from patchwright.repair.layout.pairing import pair
+from patchwright.repair.layout.quad_layout import quad_layout
+from patchwright.repair.layout.quad_smooth import smooth
+from patchwright.repair.layout.remesh import remesh
+from patchwright.repair.layout.sizing import MOST_FEATURED, MOST_QUADS, size_field
 
 SQUARE = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]
 THIN = (0.02, 0.005, 0.00125)  # heights of plates of side 1

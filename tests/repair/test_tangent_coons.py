@@ -11,9 +11,9 @@ from patchwright.models.cad import measure_seams
 from patchwright.models.io import read, write
 from patchwright.models.samples.cube_sphere import cube_sphere_patches
 from patchwright.repair import repair
-from patchwright.repair.coons_surface import coons_surface
+from patchwright.repair.cad.tangent_coons import tangent_coons, worst_angle
+from patchwright.repair.patches.coons_surface import coons_surface
 from patchwright.repair.result import Verdict
-from patchwright.repair.tangent_coons import tangent_coons, worst_angle
 
 ALL = ("u0", "u1", "v0", "v1")
 QUADRATIC = np.array([0.0, 0.0, 0.0, 1.0, 1.0, 1.0])

@@ -7,9 +7,9 @@ import pytest
 
 from patchwright.models import Triangulation
 from patchwright.models.samples import cube, sphere
-from patchwright.repair.features import find_features
-from patchwright.repair.quad_layout import quad_layout
-from patchwright.repair.tips import find_tips
+from patchwright.repair.layout.features import find_features
+from patchwright.repair.layout.quad_layout import quad_layout
+from patchwright.repair.layout.tips import find_tips
 
 
 def cone(sides=48, height=2.0, rings=1):

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from patchwright.models import ParameterError, Tolerance, Triangulation
-from patchwright.repair._near_edges_kernel import CANDIDATES, _pairs_within, trial_order
-from patchwright.repair.weld import free_edge_curve, weld, weld_distance
+from patchwright.repair.mender._near_edges_kernel import CANDIDATES, _pairs_within, trial_order
+from patchwright.repair.mender.weld import free_edge_curve, weld, weld_distance
 
 
 def test_equal_copies_merge_and_keep_every_bit() -> None:

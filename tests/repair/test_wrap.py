@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from patchwright.models import ParameterError, Triangulation
-from patchwright.repair.wrap import wrap
+from patchwright.repair.mender.wrap import wrap
 
 
 @pytest.mark.parametrize("cell", [0.2, 0.1, 0.05])

@@ -1,0 +1,1 @@
+"""Quad layouts over a triangulation: features, sizes, quads along them, structured blocks."""

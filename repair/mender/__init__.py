@@ -1,0 +1,1 @@
+"""Triangulations mended with the least change: weld, cut, bridge, unite, wrap."""

@@ -1,0 +1,1 @@
+"""Bicubic patches: Coons, projection, filling, fitting, and smooth joins of whole networks."""
