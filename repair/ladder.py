@@ -74,9 +74,9 @@ def repair(
         result = replace(result, ledger=(*task.entries, *result.ledger))
     else:
         from patchwright.repair.aside import with_aside
-        from patchwright.repair.layout.given_layout import layout_of
         from patchwright.repair.layout.quad_layout import QuadLayout
         from patchwright.repair.mesh_route import repair_mesh
+        from patchwright.repair.patches.given_layout import layout_of
 
         given = layout if isinstance(layout, str) else layout_of(layout, task.limits)
         result = repair_mesh(

@@ -19,18 +19,18 @@ from patchwright.models.errors import GeometryError
 from patchwright.models.tolerance import Tolerance
 from patchwright.models.tree import Tree
 from patchwright.models.triangulation import Triangulation
-from patchwright.repair.cad.ground import ground_of, measured, on_model, true_entry
-from patchwright.repair.cad.true_ground import TrueGround
 from patchwright.repair.decisions import Decisions
 from patchwright.repair.deviation import Deviation
-from patchwright.repair.layout.block_grid import block_grid
+from patchwright.repair.ground.true_ground import TrueGround
 from patchwright.repair.layout.blocks import Blocks, find_blocks, single_blocks, smallest_corner
 from patchwright.repair.layout.faceting import faceting
 from patchwright.repair.layout.quad_layout import QuadLayout, quad_layout
 from patchwright.repair.mender.last_resort import wrapped
 from patchwright.repair.mender.mend import BRIDGED, CUT, KEPT, Mended, mend
 from patchwright.repair.mender.mended import LEFT_OUT
+from patchwright.repair.mesh_ground import ground_of, measured, on_model, true_entry
 from patchwright.repair.patches.block_faces import BlockFaces, block_faces
+from patchwright.repair.patches.block_grid import block_grid
 from patchwright.repair.patches.joins import smooth_edges
 from patchwright.repair.patches.network import PatchNetwork
 from patchwright.repair.patches.network_seams import measure

@@ -120,8 +120,8 @@ def _go_round(
 
     from patchwright.repair.layout import _quad_kernel as kernel
     from patchwright.repair.layout import _surface_walk_kernel as walker
+    from patchwright.repair.layout.resample import resample
     from patchwright.repair.layout.ridges import Paths
-    from patchwright.repair.patches.edge_curves import resample
 
     mesh, ground = quad_mesh.mesh, quad_mesh.ground
     begin, finish = mesh.X[ends[:, 0]], mesh.X[ends[:, 1]]
@@ -204,7 +204,7 @@ def _lead_between(
     `triangle` (k, PATH_POINTS - 2) of the paths' inner points; `points` all paths.
     """
     from patchwright.repair.layout import _surface_walk_kernel as walker
-    from patchwright.repair.patches.edge_curves import resample
+    from patchwright.repair.layout.resample import resample
 
     if not len(which):
         return

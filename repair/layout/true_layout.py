@@ -15,7 +15,7 @@ import numpy as np
 from patchwright.models.arrays import Array, BoolArray
 from patchwright.models.knots import divided
 from patchwright.models.nurbs_curve import NurbsCurve
-from patchwright.repair.cad.true_ground import TrueGround
+from patchwright.repair.ground.true_ground import TrueGround
 from patchwright.repair.layout.quad_layout import QuadLayout
 
 CHORDS = 32  # per span of an edge curve, where its nearest curve is looked for

@@ -13,12 +13,12 @@ import numpy as np
 
 from patchwright.models.arrays import Array, BoolArray, IntArray
 from patchwright.repair.layout.quad_layout import QuadLayout
+from patchwright.repair.layout.resample import resample
 from patchwright.repair.patches.crease_lines import along_creases
 from patchwright.repair.patches.edge_curves import (
     SAMPLES_PER_CELL,
     EdgeCurves,
     fit_edges,
-    resample,
     with_end_bends,
     with_end_tangents,
     with_tips,

@@ -22,7 +22,7 @@ from patchwright.models.curvature_jump import curvature_jump
 from patchwright.models.errors import ParameterError
 from patchwright.models.nurbs_surface import NurbsSurface
 from patchwright.models.triangulation import Triangulation
-from patchwright.repair.cad.true_surface import Outcome
+from patchwright.repair.ground.true_surface import Outcome
 from patchwright.repair.patches.approximant import TWISTS, bicubic_approximant
 from patchwright.repair.patches.coons import offset_distance
 from patchwright.repair.patches.filling import METHODS, FillStatus, fill

@@ -14,7 +14,7 @@ import numpy as np
 from patchwright.models.arrays import Array, BoolArray
 from patchwright.models.differential import normals
 from patchwright.models.nurbs_surface import NurbsSurface
-from patchwright.repair.cad.true_ground import TrueGround
+from patchwright.repair.ground.true_ground import TrueGround
 from patchwright.repair.patches.projection import Ground
 
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from patchwright.models.arrays import Array, BoolArray, IntArray
-from patchwright.repair.cad.true_surface import Outcome
+from patchwright.repair.ground.true_surface import Outcome
 from patchwright.repair.patches.coons import coons_grid, offset_distance, offset_normals
 from patchwright.repair.patches.fair_fit import fit_patches
 from patchwright.repair.patches.filling import FillStatus, fill

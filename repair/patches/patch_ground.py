@@ -11,7 +11,7 @@ from patchwright.models.errors import ParameterError
 from patchwright.models.tolerance import Tolerance
 from patchwright.models.tree import Tree
 from patchwright.models.triangulation import Triangulation
-from patchwright.repair.cad.true_ground import TrueGround, TrueSurfaces
+from patchwright.repair.ground.true_ground import TrueGround, TrueSurfaces
 from patchwright.repair.mender.weld import weld, weld_distance
 from patchwright.repair.patches.coons import offset_distance, offset_normals
 from patchwright.repair.patches.facing import facing

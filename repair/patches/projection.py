@@ -14,8 +14,8 @@ import numpy as np
 import numpy.typing as npt
 
 from patchwright.models.arrays import Array, BoolArray, IntArray
-from patchwright.repair.cad.true_ground import TrueGround
-from patchwright.repair.cad.true_surface import Outcome
+from patchwright.repair.ground.true_ground import TrueGround
+from patchwright.repair.ground.true_surface import Outcome
 
 if TYPE_CHECKING:
     from patchwright.models.tree import ClosestPoints, SegmentHits

@@ -10,8 +10,8 @@ from quad_shapes import Marks, SphereTarget, assert_rectangles, layout_from_quad
 
 from patchwright.models.errors import GeometryError
 from patchwright.models.tolerance import Tolerance
-from patchwright.repair.layout.block_grid import block_grid
 from patchwright.repair.layout.blocks import find_blocks, smallest_corner
+from patchwright.repair.patches.block_grid import block_grid
 from patchwright.repair.patches.patch_fit import Target
 from patchwright.repair.patches.resurface import resurface
 

@@ -10,7 +10,7 @@ from patchwright.models import Assembly, Cylinder, Part, Tolerance, Triangulatio
 from patchwright.models.adjacency import Adjacency
 from patchwright.models.tree import Tree
 from patchwright.models.triangulation import concatenate
-from patchwright.repair.cad.true_ground import TrueGround, TrueSurfaces
+from patchwright.repair.ground.true_ground import TrueGround, TrueSurfaces
 from patchwright.repair.patches.patch_fit import Target
 from patchwright.repair.patches.resurface import resurface
 

@@ -9,9 +9,9 @@ from quad_shapes import layout_from_quads
 from patchwright.models import Assembly, Cylinder, Part, Plane, Sphere, Tolerance, Triangulation
 from patchwright.models.nurbs_curve import NurbsCurve
 from patchwright.models.tree import Tree
-from patchwright.repair.cad.true_deviation import true_deviation
-from patchwright.repair.cad.true_ground import TrueGround, TrueSurfaces
-from patchwright.repair.cad.true_surface import Outcome
+from patchwright.repair.ground.true_deviation import true_deviation
+from patchwright.repair.ground.true_ground import TrueGround, TrueSurfaces
+from patchwright.repair.ground.true_surface import Outcome
 from patchwright.repair.layout.true_layout import onto_curves, onto_true
 from patchwright.repair.patches.projection import project
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from patchwright.models import Cylinder, NurbsSurface, Plane, Sphere, Torus
-from patchwright.repair.cad.true_surface import Bounds, Outcome, feet, on_segments
+from patchwright.repair.ground.true_surface import Bounds, Outcome, feet, on_segments
 
 
 def segments_onto(surface, uv, reach, seed=0, tilt=0.3):

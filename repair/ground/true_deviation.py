@@ -7,8 +7,8 @@ import numpy as np
 from patchwright.models.arrays import Array, BoolArray
 from patchwright.models.tree import Tree
 from patchwright.models.triangulation import Triangulation
-from patchwright.repair.cad.true_ground import TrueGround
 from patchwright.repair.deviation import SAMPLES, Deviation, sample_area, sampled_limits, spread
+from patchwright.repair.ground.true_ground import TrueGround
 
 
 def true_deviation(

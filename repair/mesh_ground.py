@@ -12,10 +12,10 @@ from patchwright.models.arrays import Array, BoolArray
 from patchwright.models.assembly import Assembly
 from patchwright.models.tree import Tree
 from patchwright.models.triangulation import Triangulation
-from patchwright.repair.cad.true_deviation import true_deviation
-from patchwright.repair.cad.true_ground import TrueGround, TrueSurfaces
-from patchwright.repair.cad.true_surface import Outcome
 from patchwright.repair.deviation import Deviation, two_sided
+from patchwright.repair.ground.true_deviation import true_deviation
+from patchwright.repair.ground.true_ground import TrueGround, TrueSurfaces
+from patchwright.repair.ground.true_surface import Outcome
 from patchwright.repair.layout.quad_layout import QuadLayout
 from patchwright.repair.layout.true_layout import onto_true
 from patchwright.repair.mender.mend import BRIDGED, Mended

@@ -18,7 +18,7 @@ from patchwright.models.assembly import Assembly
 from patchwright.models.surface import Surface
 from patchwright.models.tree import ClosestPoints, SegmentHits, Tree
 from patchwright.models.triangulation import Triangulation
-from patchwright.repair.cad.true_surface import Bounds, Outcome, feet, on_segments
+from patchwright.repair.ground.true_surface import Bounds, Outcome, feet, on_segments
 
 ACCURACY = 1e-12  # of the diagonal
 SLANT = 0.5  # sine of the largest angle (30 degrees) between a facet and the surface it stands for
