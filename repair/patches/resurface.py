@@ -34,7 +34,7 @@ WORTH = 0.8  # twice the pieces must bring the error below this share of what it
 MOST_STRAY = (
     0.35  # of the room beside its path: how far a curve may leave it, less than half for its patches to stay open
 )
-PATIENCE = 2  # barren doublings in a row after which a curve or patch is left as it is
+PATIENCE = 3  # barren doublings in a row after which a curve or patch is left as it is
 
 Progress = Callable[[str, float], None]
 
