@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -40,6 +40,11 @@ class Tolerance:
     def tightest(self) -> float:
         """The least fit tolerance of all: what no part may be moved by without looking."""
         return min([self.fit, *(length for _, length in self.parts)])
+
+    @property
+    def careful(self) -> Tolerance:
+        """The same with the least fit tolerance for everything: for what does not tell parts apart."""
+        return replace(self, fit=self.tightest)
 
     def of_tags(self, names: Sequence[str], tags: IntArray) -> Array:
         """(n,) the fit tolerances of the parts that `tags` (n,) number, by their `names`."""

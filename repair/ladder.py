@@ -127,7 +127,9 @@ def plan_repair(
     from patchwright.repair.mender.mend import mend
     from patchwright.repair.mesh_route import mending_ledger, problems_of
 
-    mended = mend(task.body.triangulation, task.limits, openings=openings, decisions=task.decisions, progress=say)
+    mended = mend(
+        task.body.triangulation, task.limits.careful, openings=openings, decisions=task.decisions, progress=say
+    )
     ledger = (*task.entries, *mending_ledger(mended))
     return plan_of(task.model.source, ledger, size, problems_of(mended), reasons)
 
@@ -221,7 +223,7 @@ def _cad(task: _Task, openings: str, say: Progress, time_limit: float) -> Repair
 
     return repair_cad(
         task.model,
-        replace(task.limits, fit=task.limits.tightest),
+        task.limits.careful,
         openings=openings,
         diagnosis=task.diagnosis,
         decisions=task.decisions,

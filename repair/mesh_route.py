@@ -74,8 +74,7 @@ def repair_mesh(
     The other arguments are those of `repair`.
     """
     raw = assembly.triangulation
-    careful = replace(tolerance, fit=tolerance.tightest)
-    mended = mend(raw, careful, openings=openings, decisions=decisions, progress=progress)
+    mended = mend(raw, tolerance.careful, openings=openings, decisions=decisions, progress=progress)
     if mended.problems and scope == "all":
         progress("wrapping", 0.0)
         mended = wrapped(mended, raw, tolerance)

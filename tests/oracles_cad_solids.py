@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from OCP.BRep import BRep_Builder
 from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeEdge, BRepBuilderAPI_MakeFace, BRepBuilderAPI_MakeWire
 from OCP.BRepFilletAPI import BRepFilletAPI_MakeFillet
 from OCP.BRepLib import BRepLib
@@ -14,9 +15,24 @@ from OCP.Geom2d import Geom2d_Line
 from OCP.GeomAbs import GeomAbs_Shape
 from OCP.GeomAPI import GeomAPI_Interpolate
 from OCP.gp import gp_Ax3, gp_Dir, gp_Dir2d, gp_Pnt, gp_Pnt2d
+from OCP.STEPControl import STEPControl_StepModelType, STEPControl_Writer
 from OCP.TopAbs import TopAbs_ShapeEnum
-from OCP.TopoDS import TopoDS
+from OCP.TopoDS import TopoDS, TopoDS_Compound
 from oracles_cad_damage import SIZES, parts_of
+
+from patchwright.models.io import read
+
+
+def stored(path, *shapes):
+    """The kernel's shapes in one STEP file, read back as an assembly."""
+    builder, whole = BRep_Builder(), TopoDS_Compound()
+    builder.MakeCompound(whole)
+    for shape in shapes:
+        builder.Add(whole, shape)
+    writer = STEPControl_Writer()
+    writer.Transfer(whole, STEPControl_StepModelType.STEPControl_AsIs)
+    writer.Write(str(path))
+    return read(path)
 
 
 def filleted_box(radius: float = 1.0):

@@ -7,7 +7,6 @@ measured surface to surface like any others.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -64,16 +63,17 @@ def unite(assembly: Assembly, bodies: list[list[int]], *, time_limit: float | No
 def unite_here(assembly: Assembly, deviation: Array, bodies: list[list[int]]) -> tuple[Assembly, list[list[int]]]:
     """`unite` in this process: the united model, and the input faces that each of its faces may be a piece of."""
     from patchwright.models.cad import kernel
-    from patchwright.models.cad.connectivity import components
+    from patchwright.models.cad.connectivity import components, is_closed
     from patchwright.models.cad.names import face_index
     from patchwright.models.cad.native import faces_of
     from patchwright.models.cad.reading import assembly_of
-    from patchwright.models.cad.writing import compound, shape_of
+    from patchwright.models.cad.writing import body_shape, compound, shape_of
 
     _, faces = shape_of(assembly, deviation)
     assert assembly.topology is not None
     groups = components(assembly.topology)
-    solids = [_solid([[faces[i] for i in g] for g in groups if g[0] in body]) for body in map(set, bodies)]
+    shells = [[[faces[i] for i in group] for group in groups if group[0] in body] for body in map(set, bodies)]
+    solids = [body_shape(own[0], True, voids=own[1:]) for own in shells]
     first, others = kernel.List_TopoDS_Shape(), kernel.List_TopoDS_Shape()
     first.Append(solids[0])
     for solid in solids[1:]:
@@ -84,10 +84,14 @@ def unite_here(assembly: Assembly, deviation: Array, bodies: list[list[int]]) ->
     fuse.Build()
     if not fuse.IsDone():
         raise EngineError(f"the CAD kernel does not unite these {len(bodies)} bodies")
-    whole = fuse.Shape()
     united = {i for body in bodies for i in body}
     alone = [i for i in range(len(faces)) if i not in united]
-    shape = compound([whole, *_others(assembly, faces, alone)])
+    apart = [
+        body_shape([faces[i] for i in group], is_closed(assembly.topology, group))
+        for group in groups
+        if group[0] not in united
+    ]
+    shape = compound([fuse.Shape(), *apart])
     stored = face_index(faces_of(shape))
     claims: list[list[int]] = [[] for _ in range(stored.Size())]
     for i in alone:
@@ -116,43 +120,3 @@ def unite_here(assembly: Assembly, deviation: Array, bodies: list[list[int]]) ->
         faces=kept,
     )
     return replace(made, unit=assembly.unit), claims
-
-
-def _solid(shells: list[list[Any]]) -> Any:
-    """The solid that closed shells of faces bound, the outer one and those of its voids."""
-    from patchwright.models.cad import kernel
-
-    builder, solid = kernel.BRep_Builder(), kernel.TopoDS_Solid()
-    builder.MakeSolid(solid)
-    for faces in shells:
-        shell = _shell(faces)
-        shell.Closed(True)
-        builder.Add(solid, shell)
-    if len(shells) == 1:
-        kernel.BRepLib.OrientClosedSolid_s(solid)
-    return solid
-
-
-def _shell(faces: list[Any]) -> Any:
-    from patchwright.models.cad import kernel
-
-    builder, shell = kernel.BRep_Builder(), kernel.TopoDS_Shell()
-    builder.MakeShell(shell)
-    for face in faces:
-        builder.Add(shell, face)
-    return shell
-
-
-def _others(assembly: Assembly, faces: list[Any], alone: list[int]) -> list[Any]:
-    """The bodies that are not united, solids where they are closed."""
-    from patchwright.models.cad.connectivity import components, is_closed
-
-    assert assembly.topology is not None
-    left = set(alone)
-    out = []
-    for group in components(assembly.topology):
-        if group[0] not in left:
-            continue
-        own = [faces[i] for i in group]
-        out.append(_solid([own]) if is_closed(assembly.topology, group) else _shell(own))
-    return out

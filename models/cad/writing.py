@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -96,7 +96,7 @@ def shape_of(assembly: Assembly, deviation: Array, volumes: dict[int, float] | N
         groups = components(assembly.topology)
         closed = [is_closed(assembly.topology, g) for g in groups]
         known = volumes or {}
-        bodies = [_body([faces[i] for i in g], c, known.get(g[0])) for g, c in zip(groups, closed, strict=True)]
+        bodies = [body_shape([faces[i] for i in g], c, known.get(g[0])) for g, c in zip(groups, closed, strict=True)]
         return compound(bodies), faces
     kept = [i for i, p in enumerate(parts) if isinstance(p.native, NativeFace)]
     made: dict[int, Any] = {i: decode_face(parts[i].native) for i in kept}
@@ -153,24 +153,33 @@ def _kept_bodies(assembly: Assembly, kept: list[int]) -> list[Any]:
     return out
 
 
-def _body(faces: list[Any], closed: bool, volume: float | None) -> Any:
-    """A face alone, an open shell, or a solid turned outward by its volume (by the kernel where that is unknown)."""
+def body_shape(faces: list[Any], closed: bool, volume: float | None = None, voids: Sequence[list[Any]] = ()) -> Any:
+    """A face alone, an open shell, or a solid turned outward by its volume (by the kernel where that is unknown).
+
+    A solid with `voids`, the faces of each, is left as its shells are turned.
+    """
     if len(faces) == 1 and not closed:
         return faces[0]
-    builder = kernel.BRep_Builder()
-    shell = kernel.TopoDS_Shell()
+    shell = _shell(faces, closed)
+    if not closed:
+        return shell
+    builder, solid = kernel.BRep_Builder(), kernel.TopoDS_Solid()
+    builder.MakeSolid(solid)
+    builder.Add(solid, shell if volume is None or volume > 0.0 else shell.Reversed())
+    for inner in voids:
+        builder.Add(solid, _shell(inner, True))
+    if volume is None and not voids:
+        kernel.BRepLib.OrientClosedSolid_s(solid)
+    return solid
+
+
+def _shell(faces: list[Any], closed: bool) -> Any:
+    builder, shell = kernel.BRep_Builder(), kernel.TopoDS_Shell()
     builder.MakeShell(shell)
     for face in faces:
         builder.Add(shell, face)
     shell.Closed(closed)
-    if not closed:
-        return shell
-    solid = kernel.TopoDS_Solid()
-    builder.MakeSolid(solid)
-    builder.Add(solid, shell if volume is None or volume > 0.0 else shell.Reversed())
-    if volume is None:
-        kernel.BRepLib.OrientClosedSolid_s(solid)
-    return solid
+    return shell
 
 
 def compound(shapes: list[Any]) -> Any:

@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from OCP.BRep import BRep_Builder
 from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox, BRepPrimAPI_MakeCylinder, BRepPrimAPI_MakeSphere
 from OCP.gp import gp_Ax2, gp_Dir, gp_Pnt
-from OCP.STEPControl import STEPControl_StepModelType, STEPControl_Writer
-from OCP.TopoDS import TopoDS_Compound
+from oracles_cad_solids import stored
 
 from patchwright.models.cad.seams import measure_seams
-from patchwright.models.io import read
 from patchwright.repair import diagnose, repair
 from patchwright.repair.cad.bodies import closed_bodies
 from patchwright.repair.cad.deadline import Deadline
@@ -33,17 +30,6 @@ def rod(radius, length, at):
     return BRepPrimAPI_MakeCylinder(gp_Ax2(gp_Pnt(*at), gp_Dir(0, 0, 1)), radius, length).Shape()
 
 
-def written(path, *shapes):
-    builder, whole = BRep_Builder(), TopoDS_Compound()
-    builder.MakeCompound(whole)
-    for shape in shapes:
-        builder.Add(whole, shape)
-    writer = STEPControl_Writer()
-    writer.Transfer(whole, STEPControl_StepModelType.STEPControl_AsIs)
-    writer.Write(str(path))
-    return read(path)
-
-
 def joined(model):
     return united(model, diagnose(model), Deadline.after(600.0))
 
@@ -54,7 +40,7 @@ def area(model):
 
 @pytest.fixture
 def model(tmp_path):
-    return lambda *shapes: written(tmp_path / "bodies.step", *shapes)
+    return lambda *shapes: stored(tmp_path / "bodies.step", *shapes)
 
 
 def test_half_a_ball_on_a_box(model):
@@ -125,6 +111,6 @@ def test_repair_unites_loose_faces_once_they_are_sewn(tmp_path):
     from oracles_cad_damage import faces_of
 
     loose = [*faces_of(box((10, 10, 10))), *faces_of(box((4, 4, 20), (3, 3, -5)))]
-    result = repair(written(tmp_path / "loose.step", *loose))
+    result = repair(stored(tmp_path / "loose.step", *loose))
     assert result.verdict == "repaired"
     assert len(closed_bodies(result.to_assembly())) == 1

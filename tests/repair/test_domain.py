@@ -159,6 +159,9 @@ def test_parts_have_fit_tolerances_of_their_own() -> None:
     limits = fit_tolerance(model, surroundings(model, Domain(tolerances={"pod": 3e-2})), 1e-2)
     assert (limits.fit, limits.tightest, limits.given) == (1e-2, 1e-2, True)
     assert limits.of_tags(("wing", "pod"), np.array([1, 0, 1])).tolist() == [3e-2, 1e-2, 3e-2]
+    assert limits.careful.fit == 1e-2
+    tight = fit_tolerance(model, surroundings(model, Domain(tolerances={"pod": 3e-3})), 1e-2)
+    assert (tight.fit, tight.careful.fit, tight.careful.gap) == (1e-2, 3e-3, tight.gap), "no part is moved by more"
     result = repair(model, tolerance=1.5e-3, domain=Domain(tolerances={"pod": 3e-2}))
     assert result.network is not None
     tags = result.network.layout.tags

@@ -5,22 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox, BRepPrimAPI_MakeSphere
-from OCP.STEPControl import STEPControl_StepModelType, STEPControl_Writer
+from oracles_cad_solids import stored
 
-from patchwright.models.io import read
 from patchwright.repair.cad.sag import sags
-
-
-def written(path, shape):
-    writer = STEPControl_Writer()
-    writer.Transfer(shape, STEPControl_StepModelType.STEPControl_AsIs)
-    writer.Write(str(path))
-    return read(path)
 
 
 @pytest.mark.parametrize("radius", [1e-2, 5.0, 1e3])
 def test_a_sphere_strays_by_what_its_middles_lack_of_the_radius(tmp_path, radius):
-    ball = written(tmp_path / "ball.step", BRepPrimAPI_MakeSphere(radius).Shape())
+    ball = stored(tmp_path / "ball.step", BRepPrimAPI_MakeSphere(radius).Shape())
     lack = radius - np.linalg.norm(ball.parts[0].triangulation.corners.mean(axis=1), axis=1)
     (sag,) = sags(ball)
     assert sag == pytest.approx(np.percentile(lack, 99.0), rel=0.2)
@@ -28,4 +20,4 @@ def test_a_sphere_strays_by_what_its_middles_lack_of_the_radius(tmp_path, radius
 
 
 def test_planes_do_not_stray(tmp_path):
-    assert sags(written(tmp_path / "box.step", BRepPrimAPI_MakeBox(3.0, 2.0, 1.0).Shape())).max() < 1e-14
+    assert sags(stored(tmp_path / "box.step", BRepPrimAPI_MakeBox(3.0, 2.0, 1.0).Shape())).max() < 1e-14
