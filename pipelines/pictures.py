@@ -112,7 +112,8 @@ def _after(study: Study, repaired: Repaired) -> list[Scene]:
     if repaired.verdict is not Verdict.CLEAN and repaired.network is not None:
         from patchwright.models.tree import Tree
 
-        distance = Tree.of(study.assembly.triangulation).closest(body.corners.mean(axis=1)).distance
+        # corners of the drawn triangles lie on the patches, their middles below them
+        distance = Tree.of(study.assembly.triangulation).closest(body.vertices).distance[body.triangles].mean(axis=1)
         bar = "distance to the input"
         limit = [0.0, max(2.0 * study.tolerance.fit, 1e-300)]
         deviation = Scene(study.folder / "deviation.png", "deviation from the input", body.bounds)
