@@ -58,7 +58,7 @@ def grow(expansion: Array, n: int, term: float) -> int:
 
 @making
 def determinant(rows: Array, tails: Array) -> float:
-    """det(rows + tails), (3, 3) each, with the sign it has in exact arithmetic."""
+    """det(rows + tails), (3, 3) each: the sign it has in exact arithmetic, the value to rounding."""
     expansion = np.empty(LONGEST)
     part = np.empty(4)
     n = np.int64(0)
@@ -80,4 +80,9 @@ def determinant(rows: Array, tails: Array) -> float:
         part[0], part[2] = two_product_tail(p, z, part[1]), two_product_tail(e, z, part[3])
         for m in range(part.shape[0]):
             n = grow(expansion, n, part[m])
-    return expansion[n - 1] if n else 0.0
+    if n == 0:
+        return 0.0
+    total = 0.0  # smallest first: the largest alone has the sign, and up to twice the value
+    for m in range(n):
+        total += expansion[m]
+    return total if total != 0.0 else expansion[n - 1]

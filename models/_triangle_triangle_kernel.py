@@ -18,18 +18,19 @@ from patchwright.models.arrays import Array, BoolArray, IntArray
 
 PLANE_ERROR = 3.3306690738754716e-16  # (3 + 16 u) u, Shewchuk's bound of orient2d
 SPACE_ERROR = 7.771561172376103e-16  # (7 + 56 u) u, of orient3d
+TRUSTED = 1e-3  # share of its terms above which a rounded determinant has its value within 1e-12 of itself
 
 
 @making
-def orient3d(a: Array, b: Array, c: Array, d: Array) -> float:
-    """det(a - d, b - d, c - d): positive where a, b, c turn clockwise seen from d; exact sign."""
+def volume(a: Array, b: Array, c: Array, d: Array, doubt: float) -> float:
+    """det(a - d, b - d, c - d); exact, but for its last bits, where it is within `doubt` of the size of its terms."""
     adx, ady, adz = a[0] - d[0], a[1] - d[1], a[2] - d[2]
     bdx, bdy, bdz = b[0] - d[0], b[1] - d[1], b[2] - d[2]
     cdx, cdy, cdz = c[0] - d[0], c[1] - d[1], c[2] - d[2]
     p, q, r, s, t, u = bdx * cdy, cdx * bdy, cdx * ady, adx * cdy, adx * bdy, bdx * ady
     value = adz * (p - q) + bdz * (r - s) + cdz * (t - u)
     size = (abs(p) + abs(q)) * abs(adz) + (abs(r) + abs(s)) * abs(bdz) + (abs(t) + abs(u)) * abs(cdz)
-    if abs(value) > SPACE_ERROR * size or size == 0.0:
+    if abs(value) > doubt * size or size == 0.0:
         return value
     rows = np.empty((3, 3))
     tails = np.empty((3, 3))
@@ -39,6 +40,12 @@ def orient3d(a: Array, b: Array, c: Array, d: Array) -> float:
         tails[1, k] = difference_tail(b[k], d[k], rows[1, k])
         tails[2, k] = difference_tail(c[k], d[k], rows[2, k])
     return determinant(rows, tails)
+
+
+@making
+def orient3d(a: Array, b: Array, c: Array, d: Array) -> float:
+    """det(a - d, b - d, c - d): positive where a, b, c turn clockwise seen from d; exact sign."""
+    return volume(a, b, c, d, SPACE_ERROR)
 
 
 @making
@@ -271,9 +278,9 @@ def segments(
         same_corners(p, q, shared)
         low, high = np.inf, -np.inf
         for j in range(3):
-            above[j] = 0.0 if shared[j] >= 0 else orient3d(p[0], p[1], p[2], q[j])
+            above[j] = 0.0 if shared[j] >= 0 else volume(p[0], p[1], p[2], q[j], TRUSTED)
             common = shared[0] == j or shared[1] == j or shared[2] == j
-            beside[j] = 0.0 if common else orient3d(q[0], q[1], q[2], p[j])
+            beside[j] = 0.0 if common else volume(q[0], q[1], q[2], p[j], TRUSTED)
             low, high = min(low, above[j]), max(high, above[j])
         if low == 0.0 and high == 0.0:
             continue

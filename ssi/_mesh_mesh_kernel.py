@@ -17,7 +17,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from patchwright.models._triangle_triangle_kernel import dominant, orient2d, orient3d
+from patchwright.models._triangle_triangle_kernel import TRUSTED, dominant, orient2d, orient3d, volume
 from patchwright.models.arrays import Array, IntArray
 
 FACE = 6  # features: 0, 1, 2 corners; 3, 4, 5 the sides from corner 0, 1, 2 to the next; 6 the face
@@ -413,7 +413,7 @@ def place(points: Array, names: IntArray, out: Array) -> None:
         a, b, c, d = points[i], points[j], points[names[n, 2]], points[names[n, 3]]
         if names[n, 4] >= 0:
             e = points[names[n, 4]]
-            before, after = orient3d(c, d, e, a), orient3d(c, d, e, b)
+            before, after = volume(c, d, e, a, TRUSTED), volume(c, d, e, b, TRUSTED)
         else:
             # two sides in one plane: the projection in which they cross at the largest angle
             axis, best = 0, -1.0
