@@ -136,7 +136,7 @@ def output_surface(repaired: Repaired) -> tuple[Triangulation, Any, Array]:
     from patchwright.repair.mesh_route import network_invented
 
     colours = np.tile(np.array(PATCH_COLOUR, dtype=np.uint8), (len(body), 1))
-    colours[network_invented(network, intervals)] = INVENTED_COLOUR
+    colours[network_invented(network, body)] = INVENTED_COLOUR
     return body, colours, _edge_segments(repaired, joined=False)
 
 

@@ -12,6 +12,7 @@ from patchwright.models.tree import Tree
 from patchwright.repair.deviation import sample_area
 from patchwright.repair.diagnosis import Diagnosis
 from patchwright.repair.mesh_route import network_invented
+from patchwright.repair.patches.tessellation import tessellation_within
 from patchwright.repair.result import Repaired
 
 if TYPE_CHECKING:
@@ -27,9 +28,8 @@ def against_truth(repaired: Repaired, truth: Truth, diagonal: float) -> dict[str
     """Distances in shares of the diagonal, both ways, invented surface left out, and the volume's relative error."""
     if repaired.network is None:
         return {}
-    intervals = repaired.network.intervals_within(TRUE_CHORD * diagonal)
-    body = repaired.network.tessellate(intervals)
-    invented = network_invented(repaired.network, intervals)
+    body = tessellation_within(repaired.network, TRUE_CHORD * diagonal)
+    invented = network_invented(repaired.network, body)
     points, _ = sample_area(body.take(~invented), SAMPLES)
     out: dict[str, Any] = {}
     _spread(out, "result to truth", truth.distance(points) / diagonal)

@@ -38,6 +38,7 @@ from patchwright.repair.patches.patch_crossings import crossing_entries
 from patchwright.repair.patches.patch_fit import Target
 from patchwright.repair.patches.resurface import resurface
 from patchwright.repair.patches.seam_curvature import curvature_jumps
+from patchwright.repair.patches.tessellation import tessellation_within
 from patchwright.repair.result import Face, LedgerEntry, Point, Problem, Progress, Repaired, Rung, Seam, Verdict
 from patchwright.repair.symmetry import settled
 
@@ -106,7 +107,7 @@ def repair_mesh(
     if isinstance(ground, TrueGround):
         ledger += (true_entry(ground, network, assembly),)
     if scope == "all":
-        tessellation = network.tessellate(network.intervals_within(CHORD * tolerance.tightest))
+        tessellation = tessellation_within(network, CHORD * tolerance.tightest)
         tags = network.layout.tags[tessellation.tags] if tessellation.tags is not None else None
         triangulation = replace(tessellation, tags=tags, tag_names=mended.triangulation.tag_names)
     else:
@@ -162,10 +163,9 @@ def _fit(
         limits = tolerance.of_tags(body.tag_names, quads.tags)
         network = resurface(quads, target, tolerance, limits=limits, noise=mended.noise, progress=progress)
         progress("measuring coverage", 0.0)
-        intervals = network.intervals_within(CHORD * tolerance.tightest)
-        skip = network_invented(network, intervals)
-        tessellation = network.tessellate(intervals)
+        tessellation = tessellation_within(network, CHORD * tolerance.tightest)
         assert tessellation.tags is not None
+        skip = network_invented(network, tessellation)
         own = tolerance.of_tags(body.tag_names, body.tags if body.tags is not None else np.zeros(len(body), dtype=int))
         deviation = measured(ground, tessellation, (own, limits[tessellation.tags]), invented, skip)
         if best is None or deviation.coverage > best[1].coverage:
@@ -177,11 +177,11 @@ def _fit(
     return *best, attempt + 1
 
 
-def network_invented(network: PatchNetwork, intervals: int) -> BoolArray:
-    """(triangles,) whether each triangle of `network.tessellate(intervals)` lies on invented surface."""
-    cell = np.arange(intervals) * 8 // intervals
-    mark = network.invented[:, cell][:, :, cell]
-    return np.repeat(mark.reshape(-1), 2)
+def network_invented(network: PatchNetwork, tessellation: Triangulation) -> BoolArray:
+    """(triangles,) whether the middle of each triangle of a tessellation of the network lies on invented surface."""
+    assert tessellation.uv is not None
+    i, j = np.minimum((8.0 * tessellation.uv.mean(axis=1)).astype(np.int64), 7).T
+    return np.asarray(network.invented[tessellation.tags, i, j])
 
 
 def _point(where: Array) -> Point:

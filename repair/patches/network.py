@@ -16,9 +16,6 @@ from patchwright.repair.patches.edge_curves import EdgeCurves
 from patchwright.repair.patches.patch_nets import PatchNets
 from patchwright.repair.patches.spline_space import DEGREE, knots
 
-FEWEST_INTERVALS = 12
-MOST_TRIANGLES = 2_000_000
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PatchNetwork:
@@ -66,22 +63,8 @@ class PatchNetwork:
         _put_sides(self.layout, points, self.edges.sample(intervals + 1)[:, 1:-1], self.layout.vertices)
         return points
 
-    def intervals_within(self, chord: float) -> int:
-        """Intervals per side at which 99 % of the patches' tessellations stay within `chord` of the patches.
-
-        At least `FEWEST_INTERVALS`, and no more than `MOST_TRIANGLES` triangles allow.
-        """
-        points = self.nets.sample(2 * FEWEST_INTERVALS + 1)
-        sag = np.zeros(len(self))
-        for line in (points, np.swapaxes(points, 1, 2)):
-            off = line[:, 1::2] - 0.5 * (line[:, :-1:2] + line[:, 2::2])
-            sag = np.maximum(sag, np.linalg.norm(off, axis=-1).max(axis=(1, 2)))
-        wanted = FEWEST_INTERVALS * np.sqrt(float(np.percentile(sag, 99.0)) / chord)
-        allowed = max(FEWEST_INTERVALS, int(np.sqrt(MOST_TRIANGLES / (2 * len(self)))))
-        return int(np.clip(np.ceil(wanted), FEWEST_INTERVALS, allowed))
-
     def tessellate(self, intervals: int) -> Triangulation:
-        """Watertight triangles: vertices on shared edges are stored once; tag i is patch i, uv its parameters."""
+        """Watertight triangles with `intervals` along every side, stored and named as in `tessellation_within`."""
         points = self.points(intervals)
         index = self._node_numbers(intervals)
         vertices = np.empty((int(index.max()) + 1, 3))
