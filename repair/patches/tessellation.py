@@ -1,8 +1,9 @@
 """Triangles within a given chord of every patch: each patch and each shared edge cut as finely as it asks for.
 
-Patches have a power of two of intervals along u and along v, at least two, an edge the most that one of its patches has
-along it. The nodes inside a patch are a grid; between its outer ring and the four edges runs a strip that takes up the
-difference, so that the whole is watertight whatever the counts.
+Patches have their own numbers of intervals along u and along v, at least two, an edge the most that one of its patches
+has along it. To keep the different counts few they are powers of two and one and a half times these. The nodes inside
+a patch are a grid; between its outer ring and the four edges runs a strip that takes up the difference, so that the
+whole is watertight whatever the counts.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from patchwright.repair.patches.patch_nets import evaluate
 from patchwright.repair.patches.spline_space import uniform_collocation
 
 MOST_TRIANGLES = 2_000_000
-FEWEST, MOST = 2, 256  # intervals along a side
+COUNTS = np.array([2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256])  # intervals along a side
 LOOKED_AT = 4  # intervals, at least, at which the sag is measured; never fewer than a patch has pieces
 
 
@@ -42,7 +43,7 @@ def tessellation_within(network: PatchNetwork, chord: float, most: int = MOST_TR
 
 
 def intervals_within(network: PatchNetwork, chord: float, most: int = MOST_TRIANGLES) -> IntArray:
-    """(m, 2) intervals of each patch along u and v, powers of two."""
+    """(m, 2) intervals of each patch along u and v."""
     wanted = np.empty((len(network), 2))
     for cells, which, nets in network.nets.groups():
         base = np.maximum(LOOKED_AT, cells)
@@ -53,12 +54,12 @@ def intervals_within(network: PatchNetwork, chord: float, most: int = MOST_TRIAN
         # half the chord for each direction, or for the twist; a twist is split evenly
         share = np.maximum(sag, 0.25 * twist.max(axis=(1, 2))[:, None]) / (0.5 * chord)
         wanted[which] = base * np.sqrt(share)
-    wanted = np.clip(wanted, FEWEST, MOST)
-    for _ in range(2 * int(np.log2(MOST // FEWEST)) + 1):
-        own = 2 ** np.ceil(np.log2(wanted)).astype(np.int64)
+    wanted = np.clip(wanted, COUNTS[0], COUNTS[-1])
+    for _ in range(len(COUNTS)):
+        own = COUNTS[np.searchsorted(COUNTS, wanted)]
         if 2 * int(own.prod(axis=1).sum()) <= most:
             break
-        wanted = np.maximum(wanted / np.sqrt(2.0), FEWEST)
+        wanted = np.maximum(wanted / np.sqrt(2.0), COUNTS[0])
     return np.asarray(own)
 
 
