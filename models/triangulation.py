@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
 from patchwright.models.arrays import Array, IntArray, frozen
 from patchwright.models.errors import ParameterError
+
+T = TypeVar("T", bound=np.generic)
+
+CHUNK = 8192  # triangles whose areas or volumes are computed at a time
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -81,13 +86,14 @@ class Triangulation:
     @property
     def area_vectors(self) -> Array:
         """(m, 3) normals whose length is the triangle's area."""
-        corners = self.corners
-        u, v = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-        vectors = np.empty_like(u)
-        for k in range(3):
-            i, j = (k + 1) % 3, (k + 2) % 3
-            vectors[:, k] = u[:, i] * v[:, j] - u[:, j] * v[:, i]
-        vectors *= 0.5
+        vectors = np.empty((len(self), 3))
+        for first in range(0, len(self), CHUNK):  # what is in between stays small, and close to the processor
+            a, b, c = self.vertices[self.triangles[first : first + CHUNK].T]
+            u, v, out = b - a, c - a, vectors[first : first + CHUNK]
+            for k in range(3):
+                i, j = (k + 1) % 3, (k + 2) % 3
+                out[:, k] = u[:, i] * v[:, j] - u[:, j] * v[:, i]
+            out *= 0.5
         return vectors
 
     @property
@@ -132,15 +138,25 @@ class Triangulation:
         index = np.asarray(which)
         return replace(
             self,
-            triangles=self.triangles[index],
-            uv=None if self.uv is None else self.uv[index],
-            tags=None if self.tags is None else self.tags[index],
+            triangles=_taken(self.triangles, index),
+            uv=None if self.uv is None else _taken(self.uv, index),
+            tags=None if self.tags is None else _taken(self.tags, index),
         )
 
     def compact(self) -> Triangulation:
         """The same triangles without the vertices no triangle uses; the vertices' order is kept."""
-        used, triangles = np.unique(self.triangles, return_inverse=True)
-        return replace(self, vertices=self.vertices[used], triangles=triangles.reshape(-1, 3))
+        used = np.zeros(len(self.vertices), dtype=np.bool_)
+        used[self.triangles] = True
+        number = np.cumsum(used) - 1
+        return replace(self, vertices=_taken(self.vertices, used), triangles=_taken(number, self.triangles))
+
+
+def _taken(rows: npt.NDArray[T], index: npt.NDArray[Any]) -> npt.NDArray[T]:
+    """The rows of an index or a mask, read-only: nobody else has them, so that they need no copy."""
+    own: npt.NDArray[T] = rows[index]
+    if own.base is None:
+        own.flags.writeable = False
+    return own
 
 
 def concatenate(parts: list[Triangulation] | tuple[Triangulation, ...]) -> Triangulation:
@@ -160,9 +176,12 @@ def concatenate(parts: list[Triangulation] | tuple[Triangulation, ...]) -> Trian
             lookup = np.array([names.setdefault(name, len(names)) for name in own], dtype=np.int64)
             tags.append(lookup[part.tags if part.tags is not None else np.zeros(len(part), dtype=np.int64)])
     whole_uv = all(p.uv is not None for p in parts)
+    vertices = np.concatenate([p.vertices for p in parts])
+    triangles = np.concatenate([p.triangles + offset for p, offset in zip(parts, offsets[:-1], strict=True)])
+    vertices.flags.writeable = triangles.flags.writeable = False  # they are new: no copy is needed
     return Triangulation(
-        np.concatenate([p.vertices for p in parts]),
-        np.concatenate([p.triangles + offset for p, offset in zip(parts, offsets[:-1], strict=True)]),
+        vertices,
+        triangles,
         uv=np.concatenate([p.uv for p in parts if p.uv is not None]) if whole_uv else None,
         tags=np.concatenate(tags) if tagged else None,
         tag_names=tuple(names),

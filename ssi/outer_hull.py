@@ -105,8 +105,9 @@ def _welded(mesh: Triangulation) -> tuple[Triangulation, IntArray]:
     start = np.maximum.accumulate(np.where(fresh, np.arange(len(rows)), 0))
     number = np.empty(len(rows), dtype=np.int64)
     number[order] = order[start]  # the sort is stable: the lowest number of those with equal coordinates
-    used = np.unique(number[mesh.triangles])
-    number = merged(mesh.vertices, used, 0)[number]
+    used = np.zeros(len(number), dtype=np.bool_)
+    used[number[mesh.triangles]] = True
+    number = merged(mesh.vertices, np.flatnonzero(used), 0)[number]
     triangles, parent = without_flat(mesh.vertices, number[mesh.triangles])
     tags = None if mesh.tags is None else mesh.tags[parent]
     return Triangulation(mesh.vertices, triangles, tags=tags, tag_names=mesh.tag_names), parent

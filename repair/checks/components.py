@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from patchwright.models.arrays import BoolArray
-from patchwright.repair.checks.examination import Examination
+from patchwright.repair.checks.examination import Examination, corners_of
 from patchwright.repair.checks.regions import plural, regional
 from patchwright.repair.checks.registry import Finding, check
 from patchwright.repair.diagnosis import Defect, Severity
@@ -24,7 +24,7 @@ def components(exam: Examination) -> Finding:
     figures["closed_components"] = int(np.count_nonzero(closed))
     if len(closed) == 1:
         return Finding(figures=figures)
-    area = np.bincount(label, weights=exam.body.areas)
+    area = np.bincount(label, weights=exam.areas)
     outer = np.bincount(label, weights=exam.surroundings.aside[exam.body_index]) > 0
     stray = (area < STRAY * area[~outer].sum()) & ~closed & ~outer
     defects: list[Defect] = []
@@ -41,7 +41,7 @@ def components(exam: Examination) -> Finding:
 
         own = np.unique(label[index], return_inverse=True)[1].astype(np.int64)
         defects += regional(
-            exam, "component", severity, exam.body.triangles[index], exam.body.corners[index],
+            exam, "component", severity, exam.body.triangles[index], corners_of(exam.body, index),
             exam.body_index[index], say, labels=own,
         )  # fmt: skip
     return Finding(tuple(defects), figures)

@@ -8,7 +8,7 @@ import numpy as np
 
 from patchwright.models.arrays import IntArray
 from patchwright.repair.checks.crossing_curves import crossing_curves, total_length
-from patchwright.repair.checks.examination import Examination, box_of
+from patchwright.repair.checks.examination import Examination, box_of, corners_of
 from patchwright.repair.checks.regions import MOST, plural, region_labels, regional
 from patchwright.repair.checks.registry import Finding, check
 from patchwright.repair.diagnosis import Defect
@@ -48,7 +48,7 @@ def _self(exam: Examination, pairs: IntArray) -> list[Defect]:
         "self-intersection",
         "error",
         body.triangles[index],
-        body.corners[index],
+        corners_of(body, index),
         exam.body_index[index],
         say,
         labels=label,
@@ -75,11 +75,10 @@ def _overlaps(exam: Examination, pairs: IntArray) -> list[Defect]:
     which = np.unique(label[:, 0] * count + label[:, 1], return_inverse=True)[1].reshape(-1)
     curves = crossing_curves(exam.body, pairs, which)
     order = np.argsort(which, kind="stable")
-    corners = exam.body.corners
     found = []
     for own in np.split(order, np.flatnonzero(np.diff(which[order])) + 1):
         faces = np.unique(pairs[own])
-        box = box_of(corners[faces])
+        box = box_of(corners_of(exam.body, faces))
         size = float(np.linalg.norm(box[1] - box[0]))
         a, b = label[own[0]]
         parts = exam.parts_of(exam.body_index[faces])

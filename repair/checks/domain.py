@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from patchwright.models.arrays import Array
-from patchwright.repair.checks.examination import Examination, box_of
+from patchwright.repair.checks.examination import Examination, box_of, corners_of
 from patchwright.repair.checks.registry import Finding, check
 from patchwright.repair.diagnosis import Defect
 from patchwright.repair.domain import AXES
@@ -42,7 +42,7 @@ def _far_field(exam: Examination) -> list[Defect]:
     own = np.flatnonzero(around.aside)
     if not len(own):
         return []
-    box = box_of(exam.raw.corners[own])
+    box = box_of(corners_of(exam.raw, own))
     reach = float(np.linalg.norm(box[1] - box[0]))
     message = f"{'; '.join(around.reasons)}; tolerances come from the model alone, {exam.diagonal:.3g} large"
     return [Defect("far-field", "info", box.mean(axis=0), reach, exam.parts_of(own), len(own), message, box)]

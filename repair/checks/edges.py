@@ -67,26 +67,25 @@ def _unmerged(exam: Examination) -> tuple[Defect, ...]:
     if closed <= 0 or distance <= 0.0:
         return ()
     triangles, points = exam.merged.triangles, exam.merged.vertices
-    which, corner = np.nonzero(exam.adjacency.free[exam.adjacency.triangle_edges])
-    which = exam.merged_index[which]
-    tail, head = triangles[which, corner], triangles[which, (corner + 1) % 3]
-    # the free edges whose ends moved together in the weld are those that closed
-    after = exam.welded.triangles
-    still = edge_keys(after[which, corner], after[which, (corner + 1) % 3], len(exam.welded.vertices))
-    body = exam.body_adjacency.edges[exam.body_adjacency.free]
-    healed = ~np.isin(still, edge_keys(body[:, 0], body[:, 1], len(exam.welded.vertices)))
-    healed &= np.isin(which, exam.body_index)  # what was left out did not heal
-    if not healed.any():
+    # sides of the body's triangles that were free and are not any more; what was left out of the body did not heal
+    row = np.full(len(triangles), -1, dtype=np.int64)
+    row[exam.body_index] = np.arange(len(exam.body_index))
+    row = row[exam.merged_index]
+    healed_side = exam.adjacency.free[exam.adjacency.triangle_edges]
+    healed_side &= ~exam.body_adjacency.free[exam.body_adjacency.triangle_edges][row] & (row >= 0)[:, None]
+    which, corner = np.nonzero(healed_side)
+    if not len(which):
         return ()
-    place = points[np.stack([tail, head], axis=1)[healed]]
+    which = exam.merged_index[which]
+    place = points[np.stack([triangles[which, corner], triangles[which, (corner + 1) % 3]], axis=1)]
     box = box_of(place)
     message = (
         f"vertices are not merged: {plural(exam.open_edges, 'free edge')}, {left} remain after welding at "
         f"{exam.length(distance)} ({reason})"
     )
     size = float(np.linalg.norm(box[1] - box[0]))
-    parts = exam.parts_of(which[healed])
-    return (Defect("open-edge", "error", place.mean(axis=(0, 1)), size, parts, int(healed.sum()), message, box),)
+    parts = exam.parts_of(which)
+    return (Defect("open-edge", "error", place.mean(axis=(0, 1)), size, parts, len(which), message, box),)
 
 
 def _non_manifold(exam: Examination) -> list[Defect]:

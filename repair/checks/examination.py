@@ -57,7 +57,8 @@ class Examination:
     @cached_property
     def adjacency(self) -> Adjacency:
         """Of `merged` without the triangles that use one vertex twice."""
-        return Adjacency.of(self.merged.take(self.merged_index))
+        whole = len(self.merged_index) == len(self.merged)
+        return Adjacency.of(self.merged if whole else self.merged.take(self.merged_index))
 
     @cached_property
     def open_edges(self) -> int:
@@ -164,7 +165,17 @@ class Examination:
         """`body` with a consistent, outward orientation."""
         from patchwright.repair.mender.orient import orient
 
-        return orient(self.body)
+        return orient(self.body, self.body_adjacency)
+
+    @cached_property
+    def normals(self) -> Array:
+        """(b, 3) unit normals of `oriented`; zero for a triangle without area."""
+        return self.oriented.triangulation.normals
+
+    @cached_property
+    def areas(self) -> Array:
+        """(b,) areas of the triangles of `body`."""
+        return self.body.areas
 
     @cached_property
     def rims(self) -> tuple[Rim, ...]:
@@ -178,7 +189,7 @@ class Examination:
     @cached_property
     def bodies(self) -> BoolArray:
         """(c,) components of `body` that bound a body: closed, or open by gaps, holes and next to no openings."""
-        area = np.bincount(self.component, weights=self.body.areas)
+        area = np.bincount(self.component, weights=self.areas)
         wide = np.zeros(len(area))
         for rim in self.rims:
             if rim.kind == "opening":
@@ -229,7 +240,7 @@ class Examination:
         tags = self.raw.tags
         if tags is None or not self.raw.tag_names:
             return ()
-        return tuple(self.raw.tag_names[k] for k in np.unique(tags[triangles]))
+        return tuple(self.raw.tag_names[k] for k in np.flatnonzero(np.bincount(tags[triangles].reshape(-1))))
 
     def triangles_of_face(self, faces: list[int]) -> IntArray:
         """One triangle (index into `raw`) of each of some CAD faces that have any."""
@@ -242,6 +253,11 @@ class Examination:
         unit = "" if self.assembly.unit == "unknown" else f" {self.assembly.unit}"
         share = value / self.diagonal if self.diagonal > 0.0 else 0.0
         return f"{value:.3g}{unit} ({share:.2g} of the diagonal)"
+
+
+def corners_of(triangulation: Triangulation, which: IntArray) -> Array:
+    """(k, 3, 3) corners of some triangles, without those of all the others."""
+    return triangulation.vertices[triangulation.triangles[which]]
 
 
 def two_corners(triangles: IntArray) -> BoolArray:

@@ -19,9 +19,12 @@ def faces(exam: Examination) -> Finding:
 
     A degenerate triangle has a corner used twice, or a height below the rounding of its own coordinates.
     """
-    corners = exam.raw.corners
-    edges = np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2)
-    longest = edges.max(axis=1)
+    points, corners = exam.raw.vertices, exam.raw.triangles.T
+    sides = [
+        np.linalg.norm(points[a] - points[b], axis=1)
+        for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True)
+    ]
+    longest = np.maximum(np.maximum(sides[0], sides[1]), sides[2])
     area = exam.raw.areas
     height = np.divide(2.0 * area, longest, out=np.zeros_like(area), where=longest > 0.0)
     collapsed = two_corners(exam.merged.triangles)

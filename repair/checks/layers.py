@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from patchwright.models.arrays import Array, BoolArray, IntArray
-from patchwright.repair.checks.examination import Examination, box_of
+from patchwright.repair.checks.examination import Examination, box_of, corners_of
 from patchwright.repair.checks.regions import plural, region_labels
 from patchwright.repair.checks.registry import Finding, check
 from patchwright.repair.diagnosis import Defect, Severity
@@ -31,12 +31,12 @@ def layers(exam: Examination) -> Finding:
         return Finding(figures={"double_layers": 0, "contacts": 0})
     own, other, height = _next_skins(exam)
     component = exam.component
-    normal = body.normals
+    normal = exam.normals
     turn = np.einsum("ij,ij->i", normal[own], normal[other])
     apart = np.abs(height)
     strange = component[own] != component[other]
     same = turn >= PARALLEL
-    area = body.areas
+    area = exam.areas
     if area[own[same & ~strange]].sum() < LEAST * area.sum():
         same &= strange
     same &= ~_crossing(exam, own, other, same)
@@ -66,7 +66,7 @@ def _crossing(exam: Examination, own: IntArray, other: IntArray, along: BoolArra
     crossing = np.unique(np.sort(exam.component[exam.crossing_pairs], axis=1) @ [count, 1])
     key, which = np.unique(label, return_inverse=True)
     which = which.reshape(-1)
-    area = exam.body.areas
+    area = exam.areas
     whole = np.bincount(exam.component, weights=area)
     both = np.bincount(which, weights=area[own] * along)
     smaller = np.minimum(whole[key // count], whole[key % count])
@@ -82,10 +82,10 @@ def _next_skins(exam: Examination) -> tuple[IntArray, IntArray, Array]:
     from patchwright.models.tree import Tree
 
     body = exam.oriented.triangulation
-    asked = np.flatnonzero(body.normals.any(axis=1) & ~exam.surroundings.aside[exam.body_index])
+    asked = np.flatnonzero(exam.normals.any(axis=1) & ~exam.surroundings.aside[exam.body_index])
     if len(asked) > MOST:
         asked = asked[np.unique(np.linspace(0, len(asked) - 1, MOST).astype(np.int64))]
-    centre, normal = body.corners[asked].mean(axis=1), body.normals[asked]
+    centre, normal = corners_of(body, asked).mean(axis=1), exam.normals[asked]
     reach = REACH * exam.tolerance.fit
     hits = Tree.of(body).all_hits(centre - reach * normal, centre + reach * normal)
     segment, triangle = hits.segment, hits.triangle
@@ -116,11 +116,11 @@ def _found(
     links = local.reshape(-1, 2).astype(np.int64)
     label = region_labels(body.triangles[index], links)
     pair_label = label[links[:, 0]]
-    counts, corners = np.bincount(label), body.corners
+    counts = np.bincount(label)
     found = []
     for r in np.argsort(-counts, kind="stable")[:MOST_REGIONS]:
         triangles = index[label == r]
-        box = box_of(corners[triangles])
+        box = box_of(corners_of(body, triangles))
         heights = apart[pair_label == r]
         size = float(np.median(heights)) if kind == "gap" else float(np.linalg.norm(box[1] - box[0]))
         width = exam.length(float(np.median(heights)))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from patchwright.models.arrays import BoolArray, IntArray
-from patchwright.repair.checks.examination import Examination, box_of
+from patchwright.repair.checks.examination import Examination, box_of, corners_of
 from patchwright.repair.checks.regions import plural, regional
 from patchwright.repair.checks.registry import Finding, check
 from patchwright.repair.diagnosis import Defect, Severity
@@ -35,7 +35,7 @@ def orientation(exam: Examination) -> Finding:
         return f"{plural(count, 'triangle')} run against the surface around them, over {exam.length(size)}"
 
     defects = regional(
-        exam, "flipped", "error", exam.body.triangles[index], exam.body.corners[index], exam.body_index[index], say,
+        exam, "flipped", "error", exam.body.triangles[index], corners_of(exam.body, index), exam.body_index[index], say,
         labels=np.unique(zones[index], return_inverse=True)[1].astype(np.int64),
     )  # fmt: skip
     inward = whole & ~cavity & _closed(exam, parts)
@@ -96,7 +96,7 @@ def _cavities(exam: Examination, whole: BoolArray) -> BoolArray:
     if not len(outside):
         return cavity
     _, first = np.unique(component, return_index=True)
-    centre = body.corners[first[inner]].mean(axis=1)
+    centre = corners_of(body, first[inner]).mean(axis=1)
     cavity[inner] = [winding(outside.corners, point) > 0.5 for point in centre]
     return cavity
 
@@ -113,7 +113,7 @@ def _bodies(exam: Examination, which: BoolArray, severity: Severity, what: str) 
     defects = []
     for k in np.flatnonzero(which):
         own = np.flatnonzero(component == k)
-        box = box_of(exam.body.corners[own])
+        box = box_of(corners_of(exam.body, own))
         parts = exam.parts_of(exam.body_index[own])
         message = f"a component of {plural(len(own), 'triangle')} {what}"
         size = float(np.linalg.norm(box[1] - box[0]))

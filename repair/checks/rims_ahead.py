@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from patchwright.models.arrays import Array, IntArray
-from patchwright.repair.checks.examination import Examination
+from patchwright.repair.checks.examination import Examination, corners_of
 
 REACH = 0.05  # of a rim's diameter: a wall farther ahead is not what the end was meant to join
 MOSTLY = 0.9  # of a rim's length from which the wall is met
@@ -31,7 +31,7 @@ def facing_surfaces(exam: Examination) -> dict[int, Ahead]:
     wanted = [i for i, rim in enumerate(exam.rims) if rim.kind == "opening" and rim.closed and rim.overlaps is None]
     if not wanted or len(exam.component_closed) < 2:
         return {}
-    normals, corners = body.normals, body.corners  # computed anew each time they are asked for
+    normals = exam.normals
     start, ahead, owner = [], [], []
     for i in wanted:
         rim = exam.rims[i]
@@ -42,7 +42,7 @@ def facing_surfaces(exam: Examination) -> dict[int, Ahead]:
         size = np.linalg.norm(outward, axis=1)
         good = size > 0.0
         start.append(0.5 * (p + q)[good])
-        ahead.append(_away(outward[good] / size[good, None], start[-1], corners[rim.triangles[some[good]]]))
+        ahead.append(_away(outward[good] / size[good, None], start[-1], corners_of(body, rim.triangles[some[good]])))
         owner.append(np.full(int(good.sum()), i))
     origin, way, rim_of = np.concatenate(start), np.concatenate(ahead), np.concatenate(owner)
     reach = REACH * np.array([exam.rims[i].diameter for i in rim_of])

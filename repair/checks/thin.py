@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from patchwright.repair.checks.examination import Examination
+from patchwright.repair.checks.examination import Examination, corners_of
 from patchwright.repair.checks.regions import plural, regional
 from patchwright.repair.checks.registry import Finding, check
 
@@ -22,16 +22,16 @@ def thin(exam: Examination) -> Finding:
     if not len(body):
         return Finding()
     some = np.unique(np.linspace(0, len(body) - 1, MOST).astype(np.int64))
-    normal = body.normals[some]
+    normal = exam.normals[some]
     some, normal = some[normal.any(axis=1)], normal[normal.any(axis=1)]
     if not len(some):
         return Finding()
-    centre = body.corners[some].mean(axis=1)
+    centre = corners_of(body, some).mean(axis=1)
     lift = exam.tolerance.gap
     hits = Tree.of(body).first_hit(centre - lift * normal, -normal)
     hit = np.isfinite(hits.distance) & (hits.triangle >= 0)
     away = np.zeros(len(some))
-    away[hit] = np.einsum("ij,ij->i", normal[hit], body.normals[hits.triangle[hit]])
+    away[hit] = np.einsum("ij,ij->i", normal[hit], exam.normals[hits.triangle[hit]])
     hit &= away <= OPPOSED
     if not hit.any():
         return Finding(figures={"thinnest": None, "median_thickness": None})
@@ -45,6 +45,6 @@ def thin(exam: Examination) -> Finding:
 
     own = np.unique(exam.oriented.components[index], return_inverse=True)[1].astype(np.int64)
     defects = regional(
-        exam, "thin", "info", body.triangles[index], body.corners[index], exam.body_index[index], say, labels=own
+        exam, "thin", "info", body.triangles[index], corners_of(body, index), exam.body_index[index], say, labels=own
     )
     return Finding(tuple(defects), figures)

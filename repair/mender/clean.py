@@ -106,18 +106,21 @@ def drop_hanging_flats(triangulation: Triangulation, height: float) -> Cleaned:
     return Cleaned(current, parents, np.flatnonzero(gone))
 
 
-def split_non_manifold(triangulation: Triangulation, *, vertices: bool = True) -> Triangulation:
+def split_non_manifold(
+    triangulation: Triangulation, adjacency: Adjacency | None = None, *, vertices: bool = True
+) -> Triangulation:
     """The same triangles with own vertices where too many meet.
 
     At an edge used more than twice the triangles that enclose material between them stay joined and the others let go;
-    with `vertices`, triangles that only touch in a point get own copies of it.
+    with `vertices`, triangles that only touch in a point get own copies of it. `adjacency` of the same, where at hand.
+    Where nothing is to be taken apart, the triangulation itself comes back.
     """
     from patchwright.repair.mender._clean_kernel import fans, sector_partners
 
     count = len(triangulation)
     if not count:
         return triangulation
-    adjacency = Adjacency.of(triangulation)
+    adjacency = Adjacency.of(triangulation) if adjacency is None else adjacency
     many = np.flatnonzero(adjacency.use_count > 2)
     splits = np.full(len(triangulation.vertices), vertices)
     splits[adjacency.edges[many]] = True
@@ -132,19 +135,19 @@ def split_non_manifold(triangulation: Triangulation, *, vertices: bool = True) -
         adjacency.edges[many], starts, np.asarray(around)[index], triangulation.vertices, triangles
     )
     label = fans(triangles, adjacency.neighbours, left, right, splits)
-    fan, corner_fan = np.unique(label, return_inverse=True)
-    corner_fan = corner_fan.reshape(-1, 3)
+    own = label.reshape(-1) == np.arange(label.size)  # a fan's label is its first corner
+    fan = np.flatnonzero(own)
     owner = triangles.reshape(-1)[fan]
     # the first fan of a vertex keeps its number, the others are appended
-    seen = np.zeros(len(triangulation.vertices), dtype=np.bool_)
-    lead = np.zeros(len(fan), dtype=np.bool_)
-    _, at = np.unique(owner, return_index=True)
-    lead[at] = True
-    seen[owner[at]] = True
+    at = np.full(len(triangulation.vertices), -1, dtype=np.int64)
+    at[owner[::-1]] = np.arange(len(fan))[::-1]  # of several, the last one written stays: the first
+    lead = at[owner] == np.arange(len(fan))
+    if lead.all():
+        return triangulation
     number = owner.copy()
     number[~lead] = len(triangulation.vertices) + np.arange(int(np.count_nonzero(~lead)))
     points = np.concatenate([triangulation.vertices, triangulation.vertices[owner[~lead]]])
-    return replace(triangulation, vertices=points, triangles=number[corner_fan])
+    return replace(triangulation, vertices=points, triangles=number[(np.cumsum(own) - 1)[label]])
 
 
 def _use_count(base: IntArray, asked: IntArray) -> IntArray:

@@ -64,13 +64,7 @@ def _round(
     if not len(free.start):
         return None
     rim = np.unique(np.concatenate([free.start, free.end]))
-    x0, x1 = points[free.start, 0], points[free.end, 0]
-    low, high = np.minimum(x0, x1), np.maximum(x0, x1)
-    order = np.argsort(low, kind="stable")
-    edge, at, gap = nearest_edges(
-        rim, points, free.start, free.end, free.apex, order, low[order], np.maximum.accumulate(high[order]), distance,
-        HEIGHT_SHARE,
-    )  # fmt: skip
+    edge, at, gap = nearest_edges(rim, points, free.start, free.end, free.apex, distance, HEIGHT_SHARE)
     hit = np.flatnonzero(edge >= 0)
     if not len(hit):
         return None

@@ -35,7 +35,8 @@ def cure(work: Work) -> None:
         opened[work.now.triangles[wide]] = True
         left = np.flatnonzero(~wide)
         work.follow(work.now.take(left), left)
-        work.now = orient(split_non_manifold(work.now)).triangulation
+        work.now = split_non_manifold(work.now, work.adjacency())
+        work.now = orient(work.now, work.adjacency()).triangulation
         bridge_gaps(work, opened)
         after = _bad(work)
         if after.sum() < bad.sum() and _free_length(work) <= rims * (1.0 + 1e-9):

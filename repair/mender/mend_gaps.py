@@ -110,7 +110,7 @@ def fill(
             reason = f"a hole with {len(one.rims[0])} edges inside the surface"
         work.actions.append(Action(kind, "bridge", one.where, size, 0.0, reason, len(one.triangles), area=one.area))
     if made.bridges:
-        work.now = orient(work.now).triangulation
+        work.now = orient(work.now, work.adjacency()).triangulation
     return made.bridges
 
 

@@ -139,7 +139,7 @@ def conform_seams(work: Work) -> None:
 
 def orient_bodies(work: Work) -> None:
     before = len(work.now.vertices)
-    work.now = split_non_manifold(work.now, vertices=False)
+    work.now = split_non_manifold(work.now, work.adjacency(), vertices=False)
     if len(work.now.vertices) > before:
         reason = "edges with more than two triangles: those that enclose material stay joined"
         work.actions.append(
@@ -147,7 +147,7 @@ def orient_bodies(work: Work) -> None:
                 "split", "weld", middle(work.now), work.now.diagonal, 0.0, reason, len(work.now.vertices) - before
             )
         )  # fmt: skip
-    oriented = orient(work.now)
+    oriented = orient(work.now, work.adjacency())
     if oriented.flipped.any():
         some = work.now.take(oriented.flipped)
         reason = "triangles run against their neighbours, or the body faced inward"

@@ -8,7 +8,7 @@ import numpy as np
 
 from patchwright.models.adjacency import Adjacency
 from patchwright.models.arrays import Array, BoolArray, IntArray
-from patchwright.models.triangulation import Triangulation
+from patchwright.models.triangulation import CHUNK, Triangulation
 from patchwright.repair.mender.bridge import borders_of
 from patchwright.repair.mender.clean import split_non_manifold
 from patchwright.repair.mender.mend_gaps import fill
@@ -26,8 +26,8 @@ def unite(work: Work, openings: str) -> tuple[Array, ...]:
     whole = len(work.now)
     if borders:
         fill(work, borders, list(range(len(borders))), [], "close")
-    work.now = split_non_manifold(work.now)
-    oriented = orient(work.now)
+    work.now = split_non_manifold(work.now, work.adjacency())
+    oriented = orient(work.now, work.adjacency())
     work.now = oriented.triangulation
     body = oriented.components
     is_cap = np.arange(len(work.now)) >= whole
@@ -60,7 +60,7 @@ def unite(work: Work, openings: str) -> tuple[Array, ...]:
         left = np.flatnonzero(~is_cap[hull.parents])
         if len(left) < len(work.now):
             work.follow(work.now.take(left), left)
-    work.now = split_non_manifold(work.now)
+    work.now = split_non_manifold(work.now, work.adjacency())
     _drop_hollows(work)
     if len(lone):
         _join_sheets(work, *sheets)
@@ -183,8 +183,11 @@ def _around(solid: Triangulation, sheets: Triangulation, label: IntArray) -> Arr
 def _thickness(triangulation: Triangulation, body: IntArray) -> Array:
     """(b,) volume over half the area of each body."""
     parts = int(body.max(initial=-1)) + 1
-    local = triangulation.corners - triangulation.bounds.mean(axis=0)
-    six = np.bincount(body, np.einsum("ij,ij->i", local[:, 0], np.cross(local[:, 1], local[:, 2])), minlength=parts)
+    local, triple = triangulation.vertices - triangulation.bounds.mean(axis=0), np.empty(len(body))
+    for first in range(0, len(body), CHUNK):
+        a, b, c = local[triangulation.triangles[first : first + CHUNK].T]
+        triple[first : first + CHUNK] = np.einsum("ij,ij->i", a, np.cross(b, c))
+    six = np.bincount(body, triple, minlength=parts)
     area = np.bincount(body, triangulation.areas, minlength=parts)
     return np.asarray(np.abs(six) / 6.0 / np.maximum(0.5 * area, np.finfo(float).tiny))
 

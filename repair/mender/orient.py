@@ -37,15 +37,15 @@ class Oriented:
     one_sided: BoolArray
 
 
-def orient(triangulation: Triangulation) -> Oriented:
-    """Reverse as few triangles as a consistent, outward orientation takes."""
+def orient(triangulation: Triangulation, adjacency: Adjacency | None = None) -> Oriented:
+    """Reverse as few triangles as a consistent, outward orientation takes; `adjacency` of the same, where at hand."""
     from patchwright.repair.mender._orient_kernel import volumes, walk
 
     count = len(triangulation)
     if not count:
         empty = np.zeros(0, dtype=np.bool_)
         return Oriented(triangulation, empty, np.zeros(0, dtype=np.int64), empty)
-    adjacency = Adjacency.of(triangulation)
+    adjacency = Adjacency.of(triangulation) if adjacency is None else adjacency
     triangles = triangulation.triangles
     component, turn, bad = walk(triangles, adjacency.neighbours)
     parts = int(component.max()) + 1

@@ -185,12 +185,11 @@ def _groups(triangulation: Triangulation, body: IntArray, bodies: int) -> list[I
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
+    from patchwright.repair.mender._rims_kernel import boxes_of
+
     if not bodies:
         return []
-    corners = triangulation.corners
-    low, high = np.full((bodies, 3), np.inf), np.full((bodies, 3), -np.inf)
-    np.minimum.at(low, body, corners.min(axis=1))
-    np.maximum.at(high, body, corners.max(axis=1))
+    low, high = np.hsplit(boxes_of(triangulation.vertices, triangulation.triangles, body, bodies), 2)
     meets = ((low[:, None] <= high[None]) & (low[None] <= high[:, None])).all(axis=2)
     i, j = np.nonzero(meets)
     _, label = connected_components(coo_array((np.ones(len(i)), (i, j)), shape=(bodies, bodies)), directed=False)
@@ -252,10 +251,10 @@ def _rejoin(
             same = (points[triangles[:, k]] == triangulation.vertices[own[:, j]]).all(axis=1)
             old[triangles[same, k]] = own[same, j]
     # two vertices of the union at one place stay two
-    _, first = np.unique(old, return_index=True)
-    keep = np.zeros(len(points), dtype=np.bool_)
-    keep[first] = True
-    old[~keep] = -1
+    back = np.flatnonzero(old >= 0)[::-1]
+    first = np.full(len(triangulation.vertices), -1, dtype=np.int64)
+    first[old[back]] = back  # of several, the last one written stays: the first
+    old[back[first[old[back]] != back]] = -1
     fresh = old < 0
     number = old.copy()
     number[fresh] = base + np.arange(int(np.count_nonzero(fresh)))

@@ -62,6 +62,10 @@ class FreeEdges:
     triangle: IntArray
     tag: IntArray
 
+    def take(self, which: BoolArray) -> FreeEdges:
+        """Those of a mask."""
+        return FreeEdges(self.start[which], self.end[which], self.apex[which], self.triangle[which], self.tag[which])
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Pairs:
@@ -102,12 +106,25 @@ class Copies:
     distance: float
 
     @classmethod
-    def of(cls, triangulation: Triangulation, distance: float, labels: IntArray | None = None) -> Copies:
-        """The candidates within `distance` (0: none); `labels` when it is known already which vertices are one."""
+    def of(
+        cls, triangulation: Triangulation, distance: float, labels: IntArray | None = None, among: Copies | None = None
+    ) -> Copies:
+        """The candidates within `distance` (0: none).
+
+        `labels` when it is known already which vertices are one; `among` what was found before some of them became one:
+        free edges are only where free edges were.
+        """
         points, tags = triangulation.vertices, triangulation.tags
         labels = exact_labels(points) if labels is None else labels
-        triangles = labels[triangulation.triangles]
+        triangles = triangulation.triangles
+        if among is not None and among.vertices is not None:
+            triangles, tags = among.vertices[among.triangles], among.tags
+        triangles = labels[triangles]
         free = free_edges(triangles, tags)
+        if among is not None and among.vertices is not None:
+            before = np.zeros(len(points), dtype=np.bool_)
+            before[among.vertices[among.rim]] = True
+            free = free.take(before[free.start] & before[free.end])
         rim = np.zeros(len(points), dtype=np.bool_)
         rim[free.start] = rim[free.end] = True
         near: BoolArray = np.asarray(rim[triangles].any(axis=1))
@@ -164,8 +181,9 @@ def weld(triangulation: Triangulation, distance: float, copies: Copies | None = 
     if copies is not None and copies.distance < distance:
         copies = None
     if distance > 0.0 and len(triangulation):
+        known = None
         for turn in range(3):
-            known = copies if turn == 0 and copies is not None else Copies.of(triangulation, distance, root)
+            known = copies if turn == 0 and copies is not None else Copies.of(triangulation, distance, root, known)
             step = _weld_step(known, distance, spread)
             if step is None:
                 break
@@ -295,8 +313,10 @@ def _merge(triangulation: Triangulation, first: IntArray, root: IntArray) -> Wel
     clusters = (np.cumsum(lead) - 1)[root]
     place = points[kept]
     moved, largest, scatter, freedom = mean_places(points, triangulation.triangles, clusters, root != first, place)
+    triangles = clusters[triangulation.triangles]
+    place.flags.writeable = triangles.flags.writeable = False  # nobody else has them: no copy is needed
     return Welded(
-        replace(triangulation, vertices=place, triangles=clusters[triangulation.triangles]),
+        replace(triangulation, vertices=place, triangles=triangles),
         clusters,
         int(len(points) - len(kept)),
         moved,
@@ -311,12 +331,12 @@ def free_edges(triangles: IntArray, tags: IntArray | None) -> FreeEdges:
 
     a, b, c = triangles.T
     whole = (a != b) & (b != c) & (c != a)
-    index = np.flatnonzero(whole)
-    corners = triangles[index]
+    index = None if whole.all() else np.flatnonzero(whole)
+    corners = np.ascontiguousarray(triangles) if index is None else triangles[index]
     start = corners.reshape(-1)
     pick = single_sides(corners, int(triangles.max(initial=-1)) + 1)
     of, side = pick // 3, pick % 3
-    owner = index[of]
+    owner = of if index is None else index[of]
     tag = np.zeros(len(pick), dtype=np.int64) if tags is None else tags[owner]
     return FreeEdges(start[pick], corners[of, (side + 1) % 3], corners[of, (side + 2) % 3], owner, tag)
 
