@@ -31,6 +31,8 @@ FIRST_CELLS = 2
 MOST_CELLS = 16
 LEANING = 4.0  # times: a direction in which the error changes so much less than in the other gets no more pieces
 WORTH = 0.8  # twice the pieces must bring the error below this share of what it was, or they count as barren
+FINISHING = 2  # rounds more in which what the last joins have moved beyond the tolerance is fitted again
+FEW = 0.02  # of all patches: so few are not worth such a round
 MOST_STRAY = (
     0.35  # of the room beside its path: how far a curve may leave it, less than half for its patches to stay open
 )
@@ -88,13 +90,18 @@ def resurface(
         edges = fit_edge_curves(layout, target, np.asarray(edges.cells))
         state = _fit(layout, edges, patch_cells, everything, None, target, method, noise)
     shapes = VertexShapes.of(layout, edges, state.nets, target)
+    stiffness: Array | None = None
 
     def fitted(cells: IntArray) -> EdgeCurves:
         return shapes.settled(layout, fit_edge_curves(layout, target, cells), target, along)
 
     def joined(state: _State, *, last: bool = False) -> _State:
+        nonlocal stiffness
         room = np.maximum(state.error, allowed)
-        nets = (join_carefully if last else join)(layout, state.nets, room)
+        if last:
+            nets, stiffness = join_carefully(layout, state.nets, room, stiffness)
+        else:
+            nets = join(layout, state.nets, room)
         error, restless = patch_errors(nets, everything, target, state.invented)
         return _State(nets, error, restless, state.invented)
 
@@ -103,12 +110,16 @@ def resurface(
     state = _unfolded(layout, edges, state, target, allowed)
     smooth = joined(state)
     rounds = int(np.log2(MOST_CELLS // FIRST_CELLS))
+    final = False
     barren_edges = np.zeros(len(layout.edges), dtype=np.int64)
     barren_patches = np.zeros(len(layout.quads), dtype=np.int64)
     edge_error = edge_errors(layout, edges, target)
     rough = Roughness.of(layout, smooth.nets, tolerance)
-    for turn in range(rounds):
-        say("refining patches", (turn + 1) / (rounds + 1))
+    for turn in range(rounds + FINISHING):
+        say("refining patches", (turn + 1) / (rounds + FINISHING + 1))
+        poor = (smooth.error > allowed) & (barren_patches < PATIENCE)
+        if turn >= rounds and poor.mean() < FEW:
+            break
         finer = (edge_error > along) & (barren_edges < PATIENCE) & (np.asarray(edges.cells) < MOST_CELLS)
         again = finer
         if finer.any():
@@ -119,7 +130,6 @@ def resurface(
             error = edge_errors(layout, edges, target)
             barren_edges[finer] = np.where(error > WORTH * edge_error, barren_edges + 1, 0)[finer]
             edge_error = error
-        poor = (smooth.error > allowed) & (barren_patches < PATIENCE)
         double = (poor[:, None] & _restless(smooth.restless)) | rough.along
         wanted = np.maximum(np.where(double, 2, 1) * np.asarray(state.nets.cells), _needed(layout, edges))
         wanted = np.where(wanted > MOST_CELLS, state.nets.cells, wanted)
@@ -130,12 +140,14 @@ def resurface(
         before = smooth.error
         state = _fit(layout, edges, wanted, redo, state, target, method, noise)
         state = _unfolded(layout, edges, state, target, allowed)
-        smooth = joined(state)
+        final = turn + 1 >= rounds
+        smooth = joined(state, last=final)
         tried = redo[poor[redo]]
         barren_patches[tried] = np.where(smooth.error > WORTH * before, barren_patches + 1, 0)[tried]
         rough = rough.after(layout, smooth.nets, tolerance)
     say("joining patches", 0.95)
-    smooth = joined(state, last=True)
+    if not final:
+        smooth = joined(state, last=True)
     return PatchNetwork(layout, edges, smooth.nets, smooth.invented, smooth.error)
 
 

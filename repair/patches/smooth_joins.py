@@ -110,17 +110,22 @@ def join(
     return nets
 
 
-def join_carefully(layout: QuadLayout, fitted: PatchNets, room: Array) -> PatchNets:
-    """The patches with smooth seams; those that would be spoiled are kept stiffer and their neighbours follow them."""
-    stiffness = np.ones(len(fitted))
-    nets = join(layout, fitted, room, passes=FINAL_PASSES)
+def join_carefully(
+    layout: QuadLayout, fitted: PatchNets, room: Array, stiffness: Array | None = None
+) -> tuple[PatchNets, Array]:
+    """The patches with smooth seams; those that would be spoiled are kept stiffer and their neighbours follow them.
+
+    Returns the stiffness (m,) too, which the same patches may start with when they are joined again.
+    """
+    stiffness = np.ones(len(fitted)) if stiffness is None else stiffness.copy()
+    nets = join(layout, fitted, room, stiffness, passes=FINAL_PASSES)
     for _ in range(RELEASES):
-        worse = spoiled(layout, nets, fitted, room)
+        worse = spoiled(layout, nets, fitted, room) & (stiffness < STIFFER**RELEASES)
         if not worse.any():
             break
         stiffness[worse] *= STIFFER
         nets = join(layout, fitted, room, stiffness, FINAL_PASSES)
-    return nets
+    return nets, stiffness
 
 
 def _legs(nets: PatchNets) -> Array:
