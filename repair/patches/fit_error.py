@@ -9,9 +9,11 @@ from patchwright.repair.patches.patch_fit import Target, samples_for
 from patchwright.repair.patches.patch_nets import PatchNets, evaluate
 from patchwright.repair.patches.spline_space import uniform_collocation
 
+LEAST_POINTS = 60_000  # looked at in all, however few the patches are: the facets below do not get fewer with them
+
 
 def patch_errors(nets: PatchNets, which: IntArray, target: Target, invented: BoolArray) -> tuple[Array, Array]:
-    """Distances from the data at corners, edge midpoints and centres of the fit's cells.
+    """Distances from the data at corners, edge midpoints and centres of the fit's cells, and between where they are few.
 
     Parameters
     ----------
@@ -24,9 +26,10 @@ def patch_errors(nets: PatchNets, which: IntArray, target: Target, invented: Boo
     along u and along v; nan for patches that were not looked at.
     """
     out, change = np.full(len(nets), np.nan), np.full((len(nets), 2), np.nan)
+    fewest = int(np.sqrt(LEAST_POINTS / max(1, len(nets))))
     for m, n in np.unique(nets.cells[which], axis=0).tolist():
         some = which[(nets.cells[which] == (m, n)).all(axis=1)]
-        nu, nv = 2 * samples_for(m) + 1, 2 * samples_for(n) + 1
+        nu, nv = (2 * max(samples_for(cells), fewest // 2) + 1 for cells in (m, n))
         points = evaluate(nets.nets(some), uniform_collocation(m, nu), uniform_collocation(n, nv))
         closest = target.tree.closest(points.reshape(-1, 3))
         away = points - closest.points.reshape(points.shape)

@@ -33,9 +33,6 @@ LEANING = 4.0  # times: a direction in which the error changes so much less than
 WORTH = 0.8  # twice the pieces must bring the error below this share of what it was, or they count as barren
 FINISHING = 2  # rounds more in which what the last joins have moved beyond the tolerance is fitted again
 FEW = 0.02  # of all patches: so few are not worth such a round
-MOST_STRAY = (
-    0.35  # of the room beside its path: how far a curve may leave it, less than half for its patches to stay open
-)
 PATIENCE = 3  # barren doublings in a row after which a curve or patch is left as it is
 
 Progress = Callable[[str, float], None]
