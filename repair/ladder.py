@@ -86,7 +86,7 @@ def repair(
             layout=given,
             merged=isinstance(layout, str | QuadLayout),
             openings=openings,
-            clean=task.diagnosis.clean and not task.entries,
+            clean=not any(d.severity == "error" for d in task.diagnosis.defects) and not task.entries,
             decisions=task.decisions,
             progress=say,
         )

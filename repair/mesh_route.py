@@ -68,7 +68,8 @@ def repair_mesh(
     Parameters
     ----------
     merged : whether the patches of a block become one face, or each patch its own
-    clean : whether diagnosis found nothing wrong
+    clean : whether diagnosis found no error: a warning, of an opening or of thin parts, is no reason to call a model
+        repaired in which nothing was changed
     decisions : what stays as it is, and the symmetry planes whose borders stay on them
     scope : "least" keeps the input's triangles in the output triangulation, "all" takes the patches' tessellation
 

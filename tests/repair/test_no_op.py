@@ -10,7 +10,7 @@ import pytest
 
 from patchwright.models import Assembly, Tolerance, Triangulation, samples
 from patchwright.models.io import read
-from patchwright.repair import diagnose, repair
+from patchwright.repair import Verdict, diagnose, repair
 from patchwright.repair.mender.mend import KEPT, mend
 
 SHAPES = {
@@ -98,3 +98,14 @@ def test_one_triangle_missing_is_not_clean() -> None:
     result = mend(given, Tolerance.of(given))
     assert [action.kind for action in result.actions] == ["bridge"]
     assert len(result.triangulation) == len(ball)
+
+
+def test_a_model_with_nothing_but_a_warning_is_called_clean_where_nothing_was_changed() -> None:
+    ball = SHAPES["sphere"]().assembly.triangulation
+    bowl = ball.take(ball.corners.mean(axis=1)[:, 2] < 0.0)
+    found = diagnose(bowl)
+    assert not found.clean
+    assert {d.severity for d in found.defects} <= {"warning", "info"}
+    repaired = repair(bowl)
+    assert repaired.verdict == Verdict.CLEAN
+    assert np.array_equal(repaired.triangulation.corners, bowl.corners)
