@@ -32,7 +32,7 @@ MOST_CELLS = 16
 LEANING = 4.0  # times: a direction in which the error changes so much less than in the other gets no more pieces
 WORTH = 0.8  # twice the pieces must bring the error below this share of what it was, or they count as barren
 FINISHING = 2  # rounds more in which what the last joins have moved beyond the tolerance is fitted again
-FEW = 0.02  # of all patches: so few are not worth such a round
+FEW = 0.005  # of all patches: so few are not worth such a round
 PATIENCE = 3  # barren doublings in a row after which a curve or patch is left as it is
 
 Progress = Callable[[str, float], None]
@@ -127,7 +127,7 @@ def resurface(
             error = edge_errors(layout, edges, target)
             barren_edges[finer] = np.where(error > WORTH * edge_error, barren_edges + 1, 0)[finer]
             edge_error = error
-        double = (poor[:, None] & _restless(smooth.restless)) | rough.along
+        double = (poor[:, None] & _worth_halving(smooth.restless, np.asarray(state.nets.cells))) | rough.along
         wanted = np.maximum(np.where(double, 2, 1) * np.asarray(state.nets.cells), _needed(layout, edges))
         wanted = np.where(wanted > MOST_CELLS, state.nets.cells, wanted)
         changed = again[layout.quad_edges].any(axis=1)
@@ -148,9 +148,14 @@ def resurface(
     return PatchNetwork(layout, edges, smooth.nets, smooth.invented, smooth.error)
 
 
-def _restless(change: Array) -> BoolArray:
-    """(m, 2) the directions in which more pieces help: along which the distance from the data changes most."""
-    return np.asarray(LEANING * change >= change[:, ::-1])
+def _worth_halving(change: Array, cells: IntArray) -> BoolArray:
+    """(m, 2) the directions in which more pieces help: along which the distance from the data changes most.
+
+    Where these have all the pieces they may have, the other direction.
+    """
+    restless = LEANING * change >= change[:, ::-1]
+    spent = restless & (cells >= MOST_CELLS)
+    return np.asarray(restless | spent[:, ::-1])
 
 
 def _needed(layout: QuadLayout, edges: EdgeCurves) -> IntArray:
