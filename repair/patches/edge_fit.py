@@ -32,6 +32,7 @@ from patchwright.repair.patches.stars import leaving, spread
 from patchwright.repair.patches.straight import bent_ends, straighten
 from patchwright.repair.patches.vertex_shapes import facing, vertex_forms, vertex_normals
 
+FEWEST_SITES = 32  # at which the distance of a smooth curve from the surface is taken
 LEAST_LEG = 0.3  # of a leg's length is kept, however far it turned from the direction it owes its vertex
 
 
@@ -136,17 +137,22 @@ def edge_errors(layout: QuadLayout, edges: EdgeCurves, target: Target) -> Array:
     out = np.zeros(len(layout.edges))
     for cells, which, controls in edges.groups():
         count = 4 * cells + 1
-        mid = (np.arange(count) + 0.5) / count
-        points = np.einsum("ai,kid->kad", collocation(cells, mid), controls)
         on_surface = free[which]
         if on_surface.any():
-            flat = points[on_surface].reshape(-1, 3)
-            out[which[on_surface]] = target.tree.closest(flat).distance.reshape(-1, count).max(axis=1)
+            many = max(count, FEWEST_SITES)
+            flat = _at_middles(controls[on_surface], many).reshape(-1, 3)
+            out[which[on_surface]] = target.tree.closest(flat).distance.reshape(-1, many).max(axis=1)
         if (~on_surface).any():
             dense = _path_samples(layout, which[~on_surface], 4 * count + 1)
-            gap = points[~on_surface][:, :, None] - dense[:, None]
+            gap = _at_middles(controls[~on_surface], count)[:, :, None] - dense[:, None]
             out[which[~on_surface]] = np.linalg.norm(gap, axis=-1).min(axis=2).max(axis=1)
     return out
+
+
+def _at_middles(controls: Array, count: int) -> Array:
+    """(k, count, 3) points in the middles of `count` equal pieces of curves (k, cells + 3, 3)."""
+    mid = (np.arange(count) + 0.5) / count
+    return np.asarray(np.einsum("ai,kid->kad", collocation(controls.shape[1] - 3, mid), controls))
 
 
 def _path_samples(layout: QuadLayout, which: IntArray, count: int) -> Array:
