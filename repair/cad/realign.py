@@ -36,6 +36,8 @@ PROPOSALS = 4  # shifts tried
 STEPS = 16
 PATIENCE = 3  # steps in a row without getting nearer before a proposal is given up
 MOST = 0.6  # of a border that must fit to round-off
+TWINS = 0.25  # of a border that must fit, corner on corner, where the rest lies at an opening
+BENT = 0.05  # second extent to the first: less is a line, along which a piece may slide
 COARSE = 4.0  # rows farther off than the median times this hardly pull
 RESIZED = 0.1  # the largest change of size that is looked for
 IN_PLANE = 1e-12  # of a border's size and distance from the origin: it stays in its plane
@@ -95,8 +97,10 @@ def realign(draft: Draft, limits: Limits, *, sized: bool = False) -> tuple[Draft
             others = [e for e, f in owner.items() if group_of[f] != number]
             if not own or not others or limits.expired:
                 continue
-            rims = _Rims.of(draft, own)
-            fit = _motion(rims, _Rims.of(draft, others), limits, sized)
+            rims, hole = _Rims.of(draft, own), _Rims.of(draft, others)
+            fit = _motion(rims, hole, limits, sized)
+            if fit is None and not sized:
+                fit = _by_twins(draft, own, rims, hole, limits)
             # of two pieces that fit each other the one moves that has the longer border in place then
             if fit is not None and (best is None or fit.share * rims.length > best[0]):
                 best = fit.share * rims.length, number, own, fit
@@ -106,6 +110,47 @@ def realign(draft: Draft, limits: Limits, *, sized: bool = False) -> tuple[Draft
         changes.append(change)
         loose.remove(best[1])
     return draft, tuple(changes)
+
+
+def _by_twins(draft: Draft, own: list[int], rims: _Rims, hole: _Rims, limits: Limits) -> _Fit | None:
+    """The motion of a piece that borders an opening as well, so that much of its border has no counterpart.
+
+    Edges that have a twin of their own length among the hole's are enough where all of them come to lie on it, corner
+    on corner, and do not run along one line.
+    """
+    twins = _twins(rims, hole, limits)
+    if len(twins) < 2 or len(twins) == len(own):
+        return None
+    some = _Rims.of(draft, [own[k] for k in twins])
+    spread = np.linalg.svd(some.points - some.points.mean(axis=0), compute_uv=False)
+    share = some.length / rims.length
+    if spread[1] < BENT * spread[0] or share < TWINS:
+        return None
+    fit = _motion(some, hole, limits, sized=False, most=1.0)
+    if fit is None or apart(fit.motion(some.corners), hole.corners).max() > limits.on:
+        return None
+    return replace(fit, share=share)
+
+
+def _twins(rims: _Rims, hole: _Rims, limits: Limits) -> list[int]:
+    """The edges of a border with a twin: an edge of the hole as long as they are, its corners within reach of theirs.
+
+    Each is the nearest such edge of the other.
+    """
+    (length, ends), (others, tips) = ((_lengths(some), some.corners.reshape(-1, 2, 3)) for some in (rims, hole))
+    along, against = (np.linalg.norm(ends[:, None] - some[None], axis=3).max(axis=2) for some in (tips, tips[:, ::-1]))
+    gap = np.minimum(along, against)
+    gap[np.abs(length[:, None] - others[None]) > limits.on] = np.inf
+    gap[gap > np.minimum(limits.reach, RIM_SHARE * length)[:, None]] = np.inf
+    best = gap.argmin(axis=1)
+    mutual = gap.argmin(axis=0)[best] == np.arange(len(ends))
+    return np.flatnonzero(mutual & np.isfinite(gap.min(axis=1))).tolist()
+
+
+def _lengths(rims: _Rims) -> Array:
+    """(e,) along each edge's points: of congruent edges they are equal, whichever way the edges run."""
+    steps = np.diff(rims.points.reshape(-1, SAMPLES, 3), axis=1)
+    return np.asarray(np.linalg.norm(steps, axis=2).sum(axis=1))
 
 
 def _put_back(draft: Draft, faces: list[int], own: list[int], fit: _Fit, limits: Limits) -> tuple[Change, Draft]:
@@ -132,8 +177,8 @@ def _size(draft: Draft, face: int) -> float:
     return float(np.linalg.norm(np.ptp(points, axis=0)))
 
 
-def _motion(own: _Rims, others: _Rims, limits: Limits, sized: bool) -> _Fit | None:
-    """The motion that lays most of `own` onto `others`; None where there is none or none is needed.
+def _motion(own: _Rims, others: _Rims, limits: Limits, sized: bool, most: float = MOST) -> _Fit | None:
+    """The motion that lays a share `most` of `own` onto `others`; None where there is none or none is needed.
 
     `sized` allows a change of size too.
     """
@@ -142,7 +187,7 @@ def _motion(own: _Rims, others: _Rims, limits: Limits, sized: bool) -> _Fit | No
     centre = own.points.mean(axis=0)
     if float(np.median(apart(own.points, others.points))) > reach:
         return None
-    if (_nearest(others, own.points[::THIN])[1] <= limits.on).mean() >= MOST:
+    if (_nearest(others, own.points[::THIN])[1] <= limits.on).mean() >= most:
         return None  # it is in place
     shifts = (others.corners[None] - own.corners[:, None]).reshape(-1, 3)
     shifts = shifts[np.linalg.norm(shifts, axis=1) <= reach]
@@ -162,7 +207,7 @@ def _motion(own: _Rims, others: _Rims, limits: Limits, sized: bool) -> _Fit | No
         moved = motion(own.points)
         far = _nearest(others, moved)[1]
         fits = far <= limits.on
-        if fits.mean() >= MOST and np.linalg.norm(moved - own.points, axis=1).max() <= reach:
+        if fits.mean() >= most and np.linalg.norm(moved - own.points, axis=1).max() <= reach:
             return _Fit(motion, float(far[fits].max()), float(fits.mean()))
     return None
 

@@ -7,21 +7,24 @@ from typing import Any
 import numpy as np
 
 from patchwright.models.arrays import Array, IntArray
+from patchwright.models.cad.connectivity import components
 from patchwright.models.nurbs_curve import NurbsCurve
 from patchwright.models.topology import EdgeUse, Topology
+from patchwright.repair.checks.cad_loose import loose_beside
 from patchwright.repair.checks.cad_rims_sorted import beside, cut_outs
 from patchwright.repair.checks.edges import SHARES, reading
 from patchwright.repair.checks.examination import Examination, box_of
 from patchwright.repair.checks.regions import plural
 from patchwright.repair.checks.registry import Finding, check
 from patchwright.repair.checks.rims import describe, most_of_each, rim_groups
-from patchwright.repair.diagnosis import Defect
+from patchwright.repair.diagnosis import Defect, Severity
 from patchwright.repair.mender.rim_edges import RimEdges
 from patchwright.repair.mender.rims import Rim, judge_loops
 
 CHORDS = 16  # per free edge, at least
 PER_SPAN, MOST_CHORDS = 8, 256  # chords per span of its curve, and at most
 TINY = 4.0  # of the round-off tolerance: a shorter edge lies near its neighbours by being short
+REACH = 0.05  # of the diagonal: edges farther apart do not run along each other
 PROBES = 17  # per free edge where its distance from the others is asked
 
 
@@ -61,6 +64,8 @@ def cad_rims(exam: Examination) -> Finding:
         rims = beside(edges, judge_loops(edges, loops, closed, component, body, exam.tolerance.gap))
         rims = cut_outs(rims, [_is_inner_loop(topology, chain) for chain in chains], component)
         defects += [_defect(exam, rims, chains, group, edges) for group in rim_groups(rims)]
+        told = {use.edge for rim, chain in zip(rims, chains, strict=True) if rim.kind != "opening" for _, use in chain}
+        defects += _loose_pieces(exam, topology, left, told)
     for kind, word in (("gap", "gaps"), ("hole", "holes"), ("opening", "openings")):
         figures[word] = sum(rim.kind == kind for rim in rims)
     return Finding(tuple(most_of_each(exam, defects)), figures)
@@ -199,6 +204,28 @@ def _defect(exam: Examination, rims: tuple[Rim, ...], chains: list[Chain], group
     points = np.concatenate([edges.start[rim.loop] for rim in some])
     kind, severity, size, message = describe(exam, some, points, parts)
     return Defect(kind, severity, centre, size, parts, count, message, box_of(points))
+
+
+def _loose_pieces(exam: Examination, topology: Topology, left: list[Use], told: set[int]) -> list[Defect]:
+    """A gap for each piece whose edges run along another's, where no rim tells of it."""
+    piece = np.zeros(len(topology.loops), dtype=np.int64)
+    for number, faces in enumerate(components(topology)):
+        piece[faces] = number
+    out = []
+    for one in loose_beside(topology, left, piece, REACH * exam.diagonal):
+        if told & set(one.edges):
+            continue
+        parts = tuple(dict.fromkeys(exam.assembly.parts[face].name for face in one.faces))
+        severity: Severity = "error"
+        message = (
+            f"a loose piece whose edges run along others over {exam.length(one.length)}, {exam.length(one.width)} "
+            f"away in the median and at most {one.widest:.3g}"
+        )
+        if kept := exam.surroundings.keeps_gaps(parts):
+            severity, message = "info", f"{message}; {kept}"
+        where, box = one.points.mean(axis=0), box_of(one.points)
+        out.append(Defect("gap", severity, where, one.width, parts, len(one.edges), message, box))
+    return out
 
 
 def _unsewn(exam: Examination, topology: Topology, uses: list[Use], widest: float) -> list[Defect]:
