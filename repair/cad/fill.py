@@ -11,6 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from patchwright.models.analytic import Plane
 from patchwright.models.assembly import Assembly, Part
 from patchwright.models.cad.capping import FreeLoop, cap, free_loops, reason_against
 from patchwright.models.cad.connectivity import components
@@ -18,9 +19,11 @@ from patchwright.models.cad.rebuild import NOTHING
 from patchwright.models.cad.sewing import surface_difference
 from patchwright.models.errors import EngineError
 from patchwright.models.topology import Topology
+from patchwright.repair.cad.creased_ring import creased_ring
 from patchwright.repair.cad.deadline import Deadline
 from patchwright.repair.cad.draft import RIM_SHARE, Attempt, Draft, Limits, apart
 from patchwright.repair.cad.face_steps import bad_faces, built, widest
+from patchwright.repair.cad.four_sides import four_sided
 from patchwright.repair.cad.new_face import rim_normals, with_patch
 from patchwright.repair.cad.outcome import Filled, Outcome, point
 from patchwright.repair.cad.ring_judged import RingPatch
@@ -177,7 +180,9 @@ def _filled(
             continue
         several: SplitRing | str = _split(draft, ring, limits) if split else ""
         one = ring_patch(draft.topology, (ring.steps,), rim_normals(draft, set()), limits)
-        if isinstance(one, str) and not split:
+        if not split and (isinstance(one, str) or not isinstance(one.surface, Plane)):
+            several = creased_ring(draft.topology, ring.steps, rim_normals(draft, set()), limits)
+        if isinstance(one, str) and not split and isinstance(several, str):
             several = _split(draft, ring, limits)
         if not isinstance(several, str):
             draft, patches = replace(draft, topology=several.topology), several.patches
@@ -207,7 +212,11 @@ def _split(draft: Draft, ring: FreeLoop, limits: Limits) -> SplitRing | str:
     def normals(topology: Topology) -> Normals:
         return rim_normals(replace(draft, topology=topology), set())
 
-    return split_ring(draft.topology, ring.steps, normals, limits)
+    several = split_ring(draft.topology, ring.steps, normals, limits)
+    if not isinstance(several, str):
+        return several
+    one = four_sided(draft.topology, ring.steps, normals, limits)
+    return one if not isinstance(one, str) else f"{several}; {one}"
 
 
 def _with_part(draft: Draft, patch: RingPatch, ring: FreeLoop, word: str, limits: Limits) -> tuple[Draft, int]:

@@ -33,13 +33,13 @@ def ring_patch(topology: Topology, rings: tuple[Steps, ...], normals: Normals, l
 
     A sentence where none holds them.
     """
-    points = [np.concatenate([_along(topology, step) for step in ring]) for ring in rings]
+    points = [np.concatenate([points_along(topology, step) for step in ring]) for ring in rings]
     outward = newell(points[0])
     size = float(np.linalg.norm(np.ptp(np.concatenate(points), axis=0)))
     if np.linalg.norm(outward) <= limits.on * size:
         return "its edges enclose no area"
     frame = Frame.across(np.concatenate(points), outward)
-    plane = _plane(topology, rings, frame, normals, limits)
+    plane = plane_of(topology, rings, normals, limits)
     if plane is not None:
         return plane
     found: RingPatch | None = None
@@ -53,13 +53,14 @@ def ring_patch(topology: Topology, rings: tuple[Steps, ...], normals: Normals, l
     return found or "; ".join(reasons)
 
 
-def _plane(
-    topology: Topology, rings: tuple[Steps, ...], frame: Frame, normals: Normals, limits: Limits
-) -> RingPatch | None:
-    every = np.concatenate([_along(topology, step) for ring in rings for step in ring])
-    _, _, axes = np.linalg.svd(every - frame.origin, full_matrices=False)
-    n = axes[2] if axes[2] @ frame.axes[2] > 0.0 else -axes[2]
-    off = float(np.abs((every - frame.origin) @ n).max())
+def plane_of(topology: Topology, rings: tuple[Steps, ...], normals: Normals, limits: Limits) -> RingPatch | None:
+    """The plane of rings, the outer one first, that leave it by less than `limits.on`; None where they do not."""
+    outer = np.concatenate([points_along(topology, step) for step in rings[0]])
+    every = np.concatenate([points_along(topology, step) for ring in rings for step in ring])
+    origin = every.mean(axis=0)
+    _, _, axes = np.linalg.svd(every - origin, full_matrices=False)
+    n = axes[2] if axes[2] @ newell(outer) > 0.0 else -axes[2]
+    off = float(np.abs((every - origin) @ n).max())
     if off > limits.on:
         return None
     flat = Frame.across(every, n)
@@ -134,7 +135,7 @@ def _box(loops: tuple[tuple[EdgeUse, ...], ...]) -> tuple[Array, Array]:
     return points.min(axis=0), points.max(axis=0)
 
 
-def _along(topology: Topology, step: tuple[int, bool]) -> Array:
+def points_along(topology: Topology, step: tuple[int, bool]) -> Array:
     """(k, 3) points along an edge as the ring runs, without its last."""
     curve = topology.curves[step[0]]
     t = divided(curve.breaks, PROBES)

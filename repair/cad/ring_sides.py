@@ -25,7 +25,7 @@ Normals = Callable[[int, Array], Array | None]  # unit normals (k, 3) beside an 
 def sides(topology: Topology, ring: Steps) -> list[Steps]:
     """The ring cut at its corners; as one side where it has none."""
     count = len(ring)
-    ends = [_tangents(topology, step) for step in ring]
+    ends = [ends_of(topology, step) for step in ring]
     turn = np.array([_angle(ends[k - 1][1], ends[k][0]) for k in range(count)])  # where step k begins
     corners = np.flatnonzero(turn > CORNER).tolist()
     if not corners:
@@ -36,7 +36,7 @@ def sides(topology: Topology, ring: Steps) -> list[Steps]:
     ]
 
 
-def _tangents(topology: Topology, step: tuple[int, bool]) -> tuple[Array, Array]:
+def ends_of(topology: Topology, step: tuple[int, bool]) -> tuple[Array, Array]:
     """Directions in which the ring enters and leaves an edge, by chords too short to matter."""
     curve = topology.curves[step[0]]
     t0, t1 = curve.domain

@@ -65,7 +65,7 @@ def split_ring(
         return f"its ring has {count} corners, too few to be split about a centre"
     halves = []
     for side in around:
-        topology, first, second = _halved(topology, side, limits)
+        topology, first, second = halved(topology, side, limits)
         halves.append((first, second))
     normals = normals_of(topology)
     middles = np.array([_end(topology, first[-1]) for first, _ in halves])
@@ -100,7 +100,7 @@ def split_ring(
     return SplitRing(topology, tuple(patches))
 
 
-def _halved(topology: Topology, side: Steps, limits: Limits) -> tuple[Topology, Steps, Steps]:
+def halved(topology: Topology, side: Steps, limits: Limits) -> tuple[Topology, Steps, Steps]:
     """A side in two parts, cut where two of its edges meet if that is near its middle, else inside an edge."""
     _, spans = side_curve(topology, side, limits)
     stops = [b for _, _, b in spans[:-1]]
@@ -112,7 +112,12 @@ def _halved(topology: Topology, side: Steps, limits: Limits) -> tuple[Topology, 
     (edge, reverse), a, b = spans[at]
     share = (0.5 - a) / (b - a)
     t0, t1 = topology.curves[edge].domain
-    topology, (one, two) = with_cut(topology, edge, t0 + (1.0 - share if reverse else share) * (t1 - t0))
+    at_t = t0 + (1.0 - share if reverse else share) * (t1 - t0)
+    breaks = topology.curves[edge].breaks
+    knot = float(breaks[np.abs(breaks - at_t).argmin()])
+    if t0 < knot < t1 and abs(knot - at_t) <= NEAR * (t1 - t0):  # a span that is next to nothing is no use
+        at_t = knot
+    topology, (one, two) = with_cut(topology, edge, at_t)
     first, second = (two, one) if reverse else (one, two)
     return topology, (*side[:at], (first, reverse)), ((second, reverse), *side[at + 1 :])
 
