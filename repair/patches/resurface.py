@@ -25,7 +25,7 @@ from patchwright.repair.patches.network import PatchNetwork
 from patchwright.repair.patches.patch_fit import Target, fit_group
 from patchwright.repair.patches.patch_nets import PatchNets, coons_nets, folds, sides
 from patchwright.repair.patches.roughness import Roughness
-from patchwright.repair.patches.smooth_joins import join, join_carefully
+from patchwright.repair.patches.smooth_joins import STIFFER, join, join_carefully
 
 FIRST_CELLS = 2
 MOST_CELLS = 16
@@ -33,6 +33,7 @@ LEANING = 4.0  # times: a direction in which the error changes so much less than
 WORTH = 0.8  # twice the pieces must bring the error below this share of what it was, or they count as barren
 FINISHING = 2  # rounds more in which what the last joins have moved beyond the tolerance is fitted again
 FEW = 0.005  # of all patches: so few are not worth such a round
+DRAWN_OFF = 1.5  # times the error it had or may have: a patch that joining takes farther off is stiffer the next time
 PATIENCE = 3  # barren doublings in a row after which a curve or patch is left as it is
 
 Progress = Callable[[str, float], None]
@@ -100,6 +101,8 @@ def resurface(
         else:
             nets = join(layout, state.nets, room)
         error, restless = patch_errors(nets, everything, target, state.invented)
+        if stiffness is not None:
+            stiffness[error > DRAWN_OFF * room] *= STIFFER
         return _State(nets, error, restless, state.invented)
 
     edges = fitted(shapes.needed_cells(FIRST_CELLS))
