@@ -131,6 +131,20 @@ def fit_edge_curves(layout: QuadLayout, target: Target, cells: IntArray) -> Edge
     return fit_edges(groups, np.asarray(cells))
 
 
+def first_curves(layout: QuadLayout, target: Target, most: Array, cells: int, most_cells: int) -> EdgeCurves:
+    """Curves with as many pieces, `cells` or twice that and so on, as bring them within `most` (e,) of their course.
+
+    Nothing is asked of their ends: these are the curves from which the surface at the vertices is learnt.
+    """
+    own = np.full(len(layout.edges), cells, dtype=np.int64)
+    while True:
+        edges = fit_edge_curves(layout, target, own)
+        finer = (edge_errors(layout, edges, target) > most) & (own < most_cells)
+        if not finer.any():
+            return edges
+        own = np.where(finer, 2 * own, own)
+
+
 def edge_errors(layout: QuadLayout, edges: EdgeCurves, target: Target) -> Array:
     """(e,) largest distance of each curve from its crease, or from the target where it is smooth."""
     free = smooth_edges(layout)

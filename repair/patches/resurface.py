@@ -18,16 +18,18 @@ from patchwright.models.arrays import Array, BoolArray, IntArray
 from patchwright.models.tolerance import Tolerance
 from patchwright.repair.layout.quad_layout import QuadLayout
 from patchwright.repair.patches.edge_curves import EdgeCurves
-from patchwright.repair.patches.edge_fit import VertexShapes, edge_errors, fit_edge_curves
+from patchwright.repair.patches.edge_fit import VertexShapes, edge_errors, first_curves, fit_edge_curves
 from patchwright.repair.patches.fit_error import patch_errors
 from patchwright.repair.patches.knife_edges import with_knife_edges
 from patchwright.repair.patches.network import PatchNetwork
 from patchwright.repair.patches.patch_fit import Target, fit_group
 from patchwright.repair.patches.patch_nets import PatchNets, coons_nets, folds, sides
+from patchwright.repair.patches.paths_on_surface import on_surface
 from patchwright.repair.patches.roughness import Roughness
 from patchwright.repair.patches.smooth_joins import STIFFER, join, join_carefully
 
 FIRST_CELLS = 2
+CLOSE = 0.25  # of the tolerance: how far a path may stray from the target
 MOST_CELLS = 16
 LEANING = 4.0  # times: a direction in which the error changes so much less than in the other gets no more pieces
 WORTH = 0.8  # twice the pieces must bring the error below this share of what it was, or they count as barren
@@ -78,15 +80,15 @@ def resurface(
     say = progress or (lambda label, share: None)
     allowed = np.full(len(layout.quads), tolerance.fit) if limits is None else limits
     along = np.where(layout.edge_quads >= 0, allowed[layout.edge_quads], np.inf).min(axis=1)
-    patch_cells = np.full((len(layout.quads), 2), FIRST_CELLS, dtype=np.int64)
+    layout = on_surface(layout, target, CLOSE * along)
     say("fitting patches", 0.0)
-    edges = fit_edge_curves(layout, target, np.full(len(layout.edges), FIRST_CELLS, dtype=np.int64))
+    edges = first_curves(layout, target, along, FIRST_CELLS, MOST_CELLS)
     everything = np.arange(len(layout.quads))
-    state = _fit(layout, edges, patch_cells, everything, None, target, method, noise)
+    state = _fit(layout, edges, _needed(layout, edges), everything, None, target, method, noise)
     given, layout = layout, with_knife_edges(layout, state.nets, target, allowed)
     if layout is not given:
         edges = fit_edge_curves(layout, target, np.asarray(edges.cells))
-        state = _fit(layout, edges, patch_cells, everything, None, target, method, noise)
+        state = _fit(layout, edges, _needed(layout, edges), everything, None, target, method, noise)
     shapes = VertexShapes.of(layout, edges, state.nets, target)
     stiffness: Array | None = None
 
