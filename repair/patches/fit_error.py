@@ -13,7 +13,7 @@ LEAST_POINTS = 60_000  # looked at in all, however few the patches are: the face
 
 
 def patch_errors(nets: PatchNets, which: IntArray, target: Target, invented: BoolArray) -> tuple[Array, Array]:
-    """Distances from the data at corners, edge midpoints and centres of the fit's cells, and between where they are few.
+    """Distances from the data at corners, edge midpoints and centres of the fit's cells, denser where these are few.
 
     Parameters
     ----------
