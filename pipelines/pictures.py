@@ -109,13 +109,13 @@ def _after(study: Study, repaired: Repaired) -> list[Scene]:
     scene.surface(body, colours=colours)
     scene.lines(joints(repaired), colour="#8fa9bd", width=0.8).lines(borders, colour="#33475a", width=1.4)
     scenes = [scene]
-    if repaired.verdict is not Verdict.CLEAN and repaired.network is not None:
+    if repaired.network is not None and repaired.deviation is not None:
         from patchwright.models.tree import Tree
 
         # corners of the drawn triangles lie on the patches, their middles below them
         distance = Tree.of(study.assembly.triangulation).closest(body.vertices).distance[body.triangles].mean(axis=1)
         bar = "distance to the input"
-        limit = [0.0, max(2.0 * study.tolerance.fit, 1e-300)]
+        limit = [0.0, max(2.0 * repaired.deviation.output_to_input.tolerance, 1e-300)]
         deviation = Scene(study.folder / "deviation.png", "deviation from the input", body.bounds)
         scenes.append(deviation.surface(body, values=distance, range=limit, bar=bar))
     return scenes
