@@ -1,8 +1,8 @@
 """Damaged CAD files for `table_cad_healing.py`: which model, what is done to which of its faces, how large it is.
 
-Every model is damaged in every way: one face missing; three stored twice; three with their normals on the other side;
-no edge shared at all; three cut back by 1 % of the diagonal on their own surface, scaled by 1 %, shifted by 0.3 %. The
-faces are drawn by chance from those wider than the damage, the same at every run.
+Every model is damaged in every way but those of `UNMADE`: one face missing; three stored twice; three with their
+normals on the other side; no edge shared at all; three cut back by 1 % of the diagonal on their own surface, scaled by
+1 %, shifted by 0.3 %. The faces are drawn by chance from those wider than the damage, the same at every run.
 """
 
 from __future__ import annotations
@@ -21,13 +21,18 @@ sys.path.insert(0, str(HERE.parent / "tests"))
 MODELS = ("featuretype.step", "turbine_part.stp", "nacelle.stp", "filleted box", "lofted wing")
 SIZES = {"missing": 0.0, "duplicated": 0.0, "flipped": 0.0, "unshared": 0.0, "cut back": 1e-2, "scaled": 1e-2,
          "displaced": 3e-3}  # fmt: skip
+UNMADE = {  # why there is no such file
+    "nacelle.stp: cut back": "the kernel dies cutting the tube round an edge off a face",
+    "lofted wing: cut back": "tubes as wide as 1 % of the diagonal leave several pieces of a face of the thin profile",
+}
 ROOM = 8.0  # times the damage: a face narrower than this has no counterpart left
 FEW = 8  # faces: of so few, one is damaged
 
 
 def names() -> list[str]:
     """All cases, "model: damage"."""
-    return [f"{model}: {kind}" for model in MODELS for kind in SIZES]
+    every = [f"{model}: {kind}" for model in MODELS for kind in SIZES]
+    return [name for name in every if name not in UNMADE]
 
 
 def made(name: str, folder: Path) -> tuple[Path, Path, float]:
