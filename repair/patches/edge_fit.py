@@ -134,14 +134,16 @@ def fit_edge_curves(layout: QuadLayout, target: Target, cells: IntArray) -> Edge
 def first_curves(layout: QuadLayout, target: Target, most: Array, cells: int, most_cells: int) -> EdgeCurves:
     """Curves with as many pieces, `cells` or twice that and so on, as bring them within `most` (e,) of their course.
 
-    Nothing is asked of their ends: these are the curves from which the surface at the vertices is learnt.
+    Nothing is asked of their ends: these are the curves from which the surface at the vertices is learnt. A curve that
+    `most_cells` do not bring so near keeps the fewest pieces: its path leaps, and more copy the leaps.
     """
     own = np.full(len(layout.edges), cells, dtype=np.int64)
     while True:
         edges = fit_edge_curves(layout, target, own)
-        finer = (edge_errors(layout, edges, target) > most) & (own < most_cells)
+        far = edge_errors(layout, edges, target) > most
+        finer = far & (own < most_cells)
         if not finer.any():
-            return edges
+            return fit_edge_curves(layout, target, np.where(far, cells, own)) if far.any() else edges
         own = np.where(finer, 2 * own, own)
 
 

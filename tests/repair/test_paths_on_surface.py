@@ -127,3 +127,13 @@ def test_a_layout_without_smooth_edges_stays():
     vertices = body.vertices[[0, 7, -8, -1]]
     one = layout_from_quads(vertices, np.array([[0, 2, 3, 1]]), lambda a, b: vertices[[a, b]])
     assert on_surface(one, target(body), np.full(4, 1e-3)) is one
+
+
+def test_a_first_curve_that_no_number_of_pieces_brings_near_keeps_the_fewest():
+    body = rim(24)
+    ground = target(body)
+    given = over(body)  # the inner path leads through the body, deeper than half the radius whatever the curve
+    curves = first_curves(given, ground, np.full(7, 0.1 * RADIUS), 2, 16)
+    assert curves.cells[inner(given)] == 2
+    loose = first_curves(given, ground, np.full(7, 2.0 * RADIUS), 2, 16)
+    assert (np.asarray(loose.cells) == 2).all()
