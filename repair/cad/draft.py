@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -15,6 +17,8 @@ from patchwright.models.topology import Topology
 from patchwright.repair.cad.deadline import Deadline
 from patchwright.repair.cad.vetoes import Vetoes
 from patchwright.repair.result import Rung
+
+T = TypeVar("T")
 
 REACH_SHARE = 0.05  # of the diagonal: rims farther apart than this are no seam that came open
 RIM_SHARE = 0.5  # of a rim's own diagonal: a gap as wide as this is an opening
@@ -36,12 +40,25 @@ class Limits:
     loose: float
     deadline: Deadline
     vetoes: Vetoes
+    memory: dict[tuple[object, ...], tuple[tuple[object, ...], Any]] = field(
+        default_factory=dict, compare=False, repr=False
+    )
 
     @classmethod
     def of(cls, diagonal: float, seconds: float = SECONDS, vetoes: Vetoes | None = None) -> Limits:
         """The shares above of a diagonal; nothing new is begun after `seconds` of processor time."""
         on, fit, reach, loose = (share * diagonal for share in (ON_SHARE, FIT_SHARE, REACH_SHARE, LOOSE_SHARE))
         return cls(diagonal, on, fit, reach, loose, Deadline.after(seconds), vetoes or Vetoes())
+
+    def remembered(
+        self, what: str, objects: tuple[object, ...], numbers: tuple[object, ...], found: Callable[[], T]
+    ) -> T:
+        """What was found of the same objects and numbers before: rungs ask the same again at every reach."""
+        key = (what, *map(id, objects), *numbers)
+        if key not in self.memory:
+            self.memory[key] = objects, found()  # the objects are held, so that no other gets their id
+        made: T = self.memory[key][1]
+        return made
 
     @property
     def expired(self) -> bool:

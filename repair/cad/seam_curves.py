@@ -67,6 +67,22 @@ def uses_of(draft: Draft) -> dict[int, EdgeUse]:
 
 def judged(draft: Draft, seam: Seam, uses: dict[int, EdgeUse], limits: Limits) -> Judged:
     """How the faces of a seam meet, led by the piece that is nearer to the other face's surface."""
+    pieces = (seam.lead, *seam.others)
+    own = [uses[piece.edge] for piece in pieces]
+    curves = [draft.topology.curves[piece.edge] for piece in pieces]
+    objects = (*map(draft.surface, seam.faces), *curves, *(use.pcurve for use in own))
+    ranges = [number for piece in pieces for number in (piece.t0, piece.t1)]
+    numbers = (seam.against, *(use.reversed for use in own), *ranges, limits.on, limits.fit)
+    turned, meeting, curve, apart = limits.remembered(
+        "judged", objects, numbers, lambda: _judged(draft, seam, uses, limits)
+    )
+    return Judged(seam.turned() if turned else seam, meeting, curve, apart)
+
+
+def _judged(
+    draft: Draft, seam: Seam, uses: dict[int, EdgeUse], limits: Limits
+) -> tuple[bool, Meeting, NurbsCurve, float]:
+    """Whether the other piece leads, how they meet, the leading curve, and how far it is from the other surface."""
     candidates = [seam] if len(seam.others) > 1 else [seam, seam.turned()]
     tracks = [track(draft, one.lead, uses, limits) for one in candidates]
     points = [curve(np.linspace(*curve.domain, SAMPLES)) for curve in tracks]
@@ -84,7 +100,7 @@ def judged(draft: Draft, seam: Seam, uses: dict[int, EdgeUse], limits: Limits) -
         meeting = Meeting.CROSS
     else:
         meeting = Meeting.LIES if far[best] <= limits.on else Meeting.APART
-    return Judged(candidates[best], meeting, tracks[best], far[best])
+    return best == 1, meeting, tracks[best], far[best]
 
 
 def _folded(draft: Draft, seam: Seam, own: NurbsCurve, uses: dict[int, EdgeUse]) -> bool:
@@ -149,7 +165,7 @@ def common(draft: Draft, one: Judged, ends: Array, limits: Limits) -> NurbsCurve
     """The curve both faces share, from `ends[0]` to `ends[1]` (2, 3) near enough for a seam; None without one."""
     own, other = (draft.surface(face) for face in one.seam.faces)
     if one.meeting is Meeting.CROSS:
-        found = _crossing(own, other, one, ends, limits)
+        found = crossing_curve(own, other, one.track, ends, limits)
         if found is not None or one.apart > limits.on:
             return found
     moved = reattached(one.track, ends, (own,), limits)
@@ -218,9 +234,8 @@ def _along(curve: NurbsCurve, ends: Array, away: Array, limits: Limits) -> Nurbs
     return curve_on(curve, float(moved[0]), float(moved[1]))
 
 
-def _crossing(own: Surface, other: Surface, one: Judged, ends: Array, limits: Limits) -> NurbsCurve | None:
-    """The curve where two surfaces cross beside the leading edge, from end to end."""
-    curve = one.track
+def crossing_curve(own: Surface, other: Surface, curve: NurbsCurve, ends: Array, limits: Limits) -> NurbsCurve | None:
+    """The curve where two surfaces cross beside a leading one, from `ends[0]` to `ends[1]` (2, 3)."""
     t0, t1 = curve.domain
     tips = curve(np.array([t0, t1]))
     count = int(np.clip(PER_SPAN * len(curve.control_points), SAMPLES, MOST))
@@ -245,10 +260,19 @@ def _crossing(own: Surface, other: Surface, one: Judged, ends: Array, limits: Li
 
     try:
         smooth = NurbsCurve(1, np.array([0.0, 0.0, along[-1], along[-1]]), np.stack([places[0], places[-1]]))
-        made = fitted(place, smooth, FINE * limits.fit)
+        made = fitted(place, smooth, FINE * limits.fit, _less_smooth((own, other), along, places))
     except GeometryError:
         return None
     at = made(np.array(made.domain))
     points = made(np.linspace(*made.domain, 4 * SAMPLES + 1))
     sound = max(farthest(own, points), farthest(other, points)) <= limits.on
     return made if sound and np.linalg.norm(at - ends, axis=1).max() <= limits.on else None
+
+
+def _less_smooth(surfaces: tuple[Surface, ...], along: Array, places: Array) -> Array:
+    """The parameters at which a curve through `places` (k, 3) at `along` (k,) crosses knot lines of its surfaces."""
+    out = [np.zeros(0)]
+    for surface in surfaces:
+        if isinstance(surface, NurbsSurface):
+            out.append(knots_met(surface, spline(along, feet(surface, places)[2])))
+    return np.unique(np.concatenate(out))

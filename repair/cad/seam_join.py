@@ -93,7 +93,7 @@ def _joined(
 ) -> tuple[Draft, tuple[Change, ...]]:
     whole = cut(draft, reach)
     uses = uses_of(draft)
-    found = [judged(draft, seam, uses, limits) for seam in seams(draft, whole, reach, loose)]
+    found = [judged(draft, seam, uses, limits) for seam in seams(draft, whole, reach, limits, loose)]
     found = [one for one in found if one.meeting in (Meeting.LIES, Meeting.CROSS)]
     found = [one for one in found if not (_moves(one, limits) and draft.vetoed(_entry(one, reach), limits))]
     if not crossing:

@@ -18,7 +18,7 @@ from patchwright.models.arrays import Array
 from patchwright.models.cad.connectivity import is_point
 from patchwright.models.closest_point import closest_on_curve
 from patchwright.models.nurbs_curve import NurbsCurve
-from patchwright.repair.cad.draft import Draft
+from patchwright.repair.cad.draft import Draft, Limits
 
 SAMPLES = 17  # per piece where its distance from another is measured
 SLENDER = 0.1  # of a piece's length: pieces farther apart are no seam ...
@@ -151,7 +151,7 @@ def _nodes(draft: Draft, free: list[int], reach: float) -> dict[int, int]:
     return {vertex: min(some) for vertex, some in group.items()}
 
 
-def seams(draft: Draft, whole: Cut, reach: float, loose: Collection[int] = ()) -> list[Seam]:
+def seams(draft: Draft, whole: Cut, reach: float, limits: Limits, loose: Collection[int] = ()) -> list[Seam]:
     """The seams the pieces make; `loose` are faces that came loose as a whole."""
     curves = draft.topology.curves
     by_nodes: dict[tuple[int, int], list[Piece]] = {}
@@ -163,7 +163,7 @@ def seams(draft: Draft, whole: Cut, reach: float, loose: Collection[int] = ()) -
         for a, b in combinations(candidates, 2):
             if a.face == b.face:
                 continue
-            gap, length = _gap(curves[a.edge], a, curves[b.edge], b)
+            gap, length = _gap(curves[a.edge], a, curves[b.edge], b, limits)
             most = STOUT if a.face in loose or b.face in loose else SLENDER
             if gap > min(reach, most * length):
                 continue
@@ -217,8 +217,13 @@ def _seam(
     return Seam(lead, others, against, max(best[p][0] for p in run))
 
 
-def _gap(a: NurbsCurve, first: Piece, b: NurbsCurve, second: Piece) -> tuple[float, float]:
+def _gap(a: NurbsCurve, first: Piece, b: NurbsCurve, second: Piece, limits: Limits) -> tuple[float, float]:
     """The largest distance of two pieces, each from the other, and the length of the shorter."""
+    ranges = (first.t0, first.t1, second.t0, second.t1)
+    return limits.remembered("gap", (a, b), ranges, lambda: _measured(a, first, b, second))
+
+
+def _measured(a: NurbsCurve, first: Piece, b: NurbsCurve, second: Piece) -> tuple[float, float]:
     widest, shortest = 0.0, np.inf
     for curve, piece, other, range_ in ((a, first, b, second), (b, second, a, first)):
         points = curve(np.linspace(piece.t0, piece.t1, SAMPLES))

@@ -69,7 +69,7 @@ def strip_sides(draft: Draft, limits: Limits, shares: tuple[float, ...] = SHARES
 
 def _next(draft: Draft, reach: float, limits: Limits) -> tuple[Draft, Change] | None:
     whole, uses = cut(draft, reach), uses_of(draft)
-    found = [judged(draft, seam, uses, limits) for seam in seams(draft, whole, reach)]
+    found = [judged(draft, seam, uses, limits) for seam in seams(draft, whole, reach, limits)]
     found = [one for one in found if one.meeting is not Meeting.FOLD]
     apart = {face for one in found if one.meeting is Meeting.APART for face in one.seam.faces}
     candidates = []

@@ -14,14 +14,18 @@ import numpy as np
 
 from patchwright.models.arrays import Array, BoolArray, IntArray
 from patchwright.models.assembly import Assembly
+from patchwright.models.cad.seams import measure_seams
+from patchwright.models.cad.sewing import surface_difference
 from patchwright.models.cad.status import brep_status
 from patchwright.models.cad.uniting import United, unite
 from patchwright.models.errors import EngineError
 from patchwright.models.tree import Tree
 from patchwright.models.triangulation import Triangulation
 from patchwright.repair.cad.bodies import closed_bodies, inside, shell_of
+from patchwright.repair.cad.crossing_edges import redrawn
 from patchwright.repair.cad.deadline import Deadline
-from patchwright.repair.cad.face_steps import free_edges
+from patchwright.repair.cad.draft import Draft, Limits
+from patchwright.repair.cad.face_steps import built, free_edges, widest
 from patchwright.repair.cad.outcome import point
 from patchwright.repair.cad.sag import sags
 from patchwright.repair.deviation import sample_area
@@ -84,7 +88,30 @@ def united(model: Assembly, diagnosis: Diagnosis, deadline: Deadline) -> Union:
         wrong = str(error)
     if wrong:
         return Union(model, same, entries=(_left(model, bodies, places, wrong),))
-    return _told(model, bodies, made, places)
+    return _told(model, bodies, _exact(made, bodies, deadline), places)
+
+
+def _exact(made: United, bodies: list[list[int]], deadline: Deadline) -> United:
+    """The union with the edges in which its bodies cross drawn anew, where that holds and narrows the seams."""
+    model = made.assembly
+    body = np.full(int(made.origin.max()) + 1, -1)
+    for number, faces in enumerate(bodies):
+        body[[face for face in faces if face < len(body)]] = number
+    own = body[made.origin]
+    seams = measure_seams(model)
+    across = {s.edge for s in seams if own[s.faces[0]] != own[s.faces[1]] and min(own[list(s.faces)]) >= 0}
+    if not across or model.topology is None or deadline.passed:
+        return made
+    limits = Limits.of(model.diagonal, deadline.left(deadline.limit))
+    better = built(model, redrawn(Draft(model, model.topology), across, limits), limits)
+    if better is None or better.topology is None or len(better.parts) != len(model.parts):
+        return made
+    sound = free_edges(better) <= free_edges(model) and not set(brep_status(better).invalid)
+    if not sound or widest(better) > max(s.gap for s in seams):
+        return made
+    pairs = zip(model.parts, better.parts, strict=True)
+    change = max(surface_difference(a.surface, b.surface) for a, b in pairs)
+    return made if change > UNCHANGED * max(model.diagonal, 1.0) else replace(made, assembly=better)
 
 
 def _overlapping(model: Assembly, diagnosis: Diagnosis) -> list[list[int]]:

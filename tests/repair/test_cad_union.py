@@ -4,11 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox, BRepPrimAPI_MakeCylinder, BRepPrimAPI_MakeSphere
+from OCP.BRepPrimAPI import (
+    BRepPrimAPI_MakeBox,
+    BRepPrimAPI_MakeCylinder,
+    BRepPrimAPI_MakeSphere,
+    BRepPrimAPI_MakeTorus,
+)
 from OCP.gp import gp_Ax2, gp_Dir, gp_Pnt
-from oracles_cad_solids import stored
+from oracles_cad_solids import lofted_wing, stored
 
 from patchwright.models.cad.seams import measure_seams
+from patchwright.models.cad.status import brep_status
+from patchwright.models.io import read, write
 from patchwright.repair import diagnose, repair
 from patchwright.repair.cad.bodies import closed_bodies
 from patchwright.repair.cad.deadline import Deadline
@@ -86,6 +93,38 @@ def test_a_body_inside_another_is_told_and_dropped(model):
     union = joined(bodies)
     assert len(union.model.parts) == 6
     assert area(union.model) == pytest.approx(600.0)
+
+
+def slanted(radius, length, at):
+    return BRepPrimAPI_MakeCylinder(gp_Ax2(gp_Pnt(*at), gp_Dir(1.0, 0.3, 0.2)), radius, length).Shape()
+
+
+def ring():
+    return BRepPrimAPI_MakeTorus(gp_Ax2(gp_Pnt(0, 0, 0), gp_Dir(0, 0, 1)), 5.0, 1.5).Shape()
+
+
+def fuselage():
+    return BRepPrimAPI_MakeCylinder(gp_Ax2(gp_Pnt(-2.0, 0.0, 0.05), gp_Dir(1, 0, 0)), 0.36, 5.0).Shape()
+
+
+CROSSING = {
+    "rods": lambda: (rod(2.0, 20.0, (0, 0, -10)), slanted(1.2, 20.0, (-9, -3, -2))),
+    "ring and rod": lambda: (ring(), slanted(1.0, 20.0, (-9, -3, -2))),
+    "balls": lambda: (ball(5), ball(4, (6, 0, 0)), ball(3, (11, 0.5, 0))),
+    "wing and fuselage": lambda: (fuselage(), lofted_wing()),
+}
+
+
+@pytest.mark.parametrize("name", CROSSING)
+def test_bodies_meet_in_exact_curves_also_once_written(model, tmp_path, name):
+    bodies = model(*CROSSING[name]())
+    union = joined(bodies)
+    assert union.made
+    write(tmp_path / "united.step", union.model)
+    again = read(tmp_path / "united.step")
+    assert free_edges(again) == free_edges(union.model) == 0
+    assert not set(brep_status(again).invalid)
+    assert max(s.gap for s in measure_seams(again)) <= 1e-10 * bodies.diagonal
 
 
 @pytest.mark.parametrize("at", [(10, 2, 2), (10, 0, 0), (10.001, 0, 0), (30, 0, 0)])

@@ -61,7 +61,7 @@ def test_one_edge_against_three_is_cut_at_their_corners():
     whole = cut(draft, 1e-6)
     (long,) = [some for some in whole.pieces.values() if len(some) == 3]
     assert [piece.t1 for piece in long] == pytest.approx([0.2, 0.7, 1.0], abs=1e-12)
-    found = seams(draft, whole, 1e-6)
+    found = seams(draft, whole, 1e-6, LIMITS)
     # three with the long edge, two between the three
     assert sorted(seam.faces for seam in found) == [(0, 1), (0, 2), (0, 3), (1, 2), (2, 3)]
 
