@@ -75,6 +75,13 @@ def pair_score(coarse: CoarseMesh, least: float = ACCEPTABLE) -> Array:
     angle = np.where(left < 0, 360.0 - angle, angle)
     flat = np.einsum("ij,ij->i", normals[t], normals[o])
     value = np.clip(1.0 - np.abs(angle - 90.0).max(axis=1) / 90.0, 0.0, 1.0) * np.clip(flat, 0.0, 1.0)
+    # flat at a corner that is the only one on its side of a curve which does not end there
+    at_a = (mesh.T[o] == a[:, None]).argmax(axis=1)
+    bc, ca, ad, db = (
+        mesh.F[which, side % 3] >= 0 for which, side in ((t, k + 1), (t, k + 2), (o, at_a), (o, at_a + 1))
+    )
+    both = np.stack([ca & ad, ad & db, db & bc, bc & ca], axis=1)
+    value[(both & (mesh.kind[corners] == 1)).any(axis=1)] = 0.0
     score = np.zeros(mesh.T.shape)
     score[t, k] = np.where(value >= least, value, 0.0)
     return score
