@@ -22,6 +22,7 @@ from patchwright.repair.layout._surface_walk_kernel import inner, walk
 
 _SOFT = 0.1  # corners much better than this hardly count beside poor ones
 _SLENDER = 4.0  # quads as many times longer than wide are as good as square ones
+BENT = 0.93  # straightness of nearly a quarter circle: a side on a curve that bends more leaves its corners no room
 
 
 @njit(cache=True, nogil=True, error_model="numpy", _nrt=False, no_cfunc_wrapper=True)
@@ -187,6 +188,17 @@ def _cost(quality):
     if quality > 0.0:
         return 1.0 / (quality + _SOFT) ** 2
     return (1.0 - 2.0 * quality / _SOFT) / _SOFT**2
+
+
+@inner
+def straightness(m, g, c, a, b, low, high):
+    """How straight curve c is between vertices a and b at arc lengths: the chord over those to its middle and on."""
+    X = m.X
+    x, y, z, _, _ = on_curve(g, c, 0.5 * (low + high))
+    chord = np.sqrt((X[a, 0] - X[b, 0]) ** 2 + (X[a, 1] - X[b, 1]) ** 2 + (X[a, 2] - X[b, 2]) ** 2)
+    one = np.sqrt((X[a, 0] - x) ** 2 + (X[a, 1] - y) ** 2 + (X[a, 2] - z) ** 2)
+    two = np.sqrt((X[b, 0] - x) ** 2 + (X[b, 1] - y) ** 2 + (X[b, 2] - z) ** 2)
+    return chord / (one + two) if one + two > 0.0 else 1.0
 
 
 @njit(cache=True, nogil=True, error_model="numpy", _nrt=False, no_cfunc_wrapper=True)

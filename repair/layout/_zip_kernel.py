@@ -22,7 +22,7 @@ from patchwright.repair.layout._disc_kernel import (
     sector_start,
     take_back,
 )
-from patchwright.repair.layout._quad_kernel import quad_quality
+from patchwright.repair.layout._quad_kernel import BENT, quad_quality, straightness
 from patchwright.repair.layout._regular_kernel import FLOOR, even_out, improve, index_around, longest_edge
 from patchwright.repair.layout._rows_kernel import MOST_ROWS, MOST_TURN, gather_rows, in_line, next_round, turn_start
 from patchwright.repair.layout._zip_rows_kernel import zip_rows
@@ -55,6 +55,34 @@ def poorest(m, net, s, near):
         worst = min(worst, quad_quality(m, s.near[i], net.quads, net.outward))
         longest = max(longest, longest_edge(m, net, s.near[i]))
     return worst, longest
+
+
+@inner
+def straightest(m, g, net, v, worst):
+    """The least of `worst` and the straightness of the sides on curves at a vertex."""
+    start = turn_start(net, v)
+    h = start
+    for _ in range(MOST_TURN):
+        back = preceding(h)
+        worst = min(worst, min(side_straightness(m, g, net, h), side_straightness(m, g, net, back)))
+        h = next_round(net, h, start)
+        if h < 0:
+            break
+    return worst
+
+
+@inner
+def side_straightness(m, g, net, h):
+    """Straightness of a half-edge, 1 off the curves."""
+    c = net.curve[h]
+    if c < 0:
+        return 1.0
+    a, b = net.quads[h // 4, h % 4], net.quads[h // 4, (h % 4 + 1) % 4]
+    if net.along[h] < 0:
+        a, b = b, a
+    low = m.vs[a] if m.kind[a] == 1 else 0.0
+    high = m.vs[b] if m.kind[b] == 1 else g.along[g.off[c + 1] - 1]
+    return straightness(m, g, c, a, b, low, high)
 
 
 @inner
@@ -112,9 +140,11 @@ def zip_up(m, g, net, d, s, limit, least, stretch, most):
         count = gather_rows(net, np.int64(one), np.int64(two), rows)
         # how poor the quads are now
         net.used[2] += 1
-        near = np.int64(0)
+        near, straight = np.int64(0), BENT
         for i in range(count):
             a, b = rows[i, 0], rows[i, 1]
+            for v in (net.quads[a // 4, a % 4], net.quads[b // 4, b % 4], net.quads[b // 4, (b % 4 + 1) % 4]):
+                straight = straightest(m, g, net, v, straight)
             near = quads_round(net, d, s, net.quads[a // 4, a % 4], near)
             near = quads_round(net, d, s, net.quads[b // 4, b % 4], near)
             near = quads_round(net, d, s, net.quads[b // 4, (b % 4 + 1) % 4], near)
@@ -151,6 +181,7 @@ def zip_up(m, g, net, d, s, limit, least, stretch, most):
             for i in range(left):
                 if net.at[touched[i]] >= 0:
                     good = good and quads_at(net, touched[i]) >= 3
+                    good = good and straightest(m, g, net, touched[i], 1.0) >= straight
                     near = quads_round(net, d, s, touched[i], near)
             worst, longest = poorest(m, net, s, near)
             good = good and worst >= bound and longest <= far

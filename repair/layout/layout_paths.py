@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from patchwright.models.arrays import Array, BoolArray, IntArray
 from patchwright.repair.layout.features import SHARP, Features
+from patchwright.repair.layout.finer_quads import side_arcs
 from patchwright.repair.layout.pairing import QuadMesh
 
 PATH_POINTS = 9  # of a smooth edge
@@ -31,6 +32,20 @@ class LayoutEdges:
     path_offsets: IntArray
     path_points: Array
     coverage: float
+
+    def middles(self) -> Array:
+        """(e, 3) the points halfway along the paths."""
+        from patchwright.repair.layout.resample import resample
+
+        return np.ascontiguousarray(resample(self.path_points, self.path_offsets, 3)[:, 1])
+
+    def led_along(self, edges: IntArray, paths: Array) -> LayoutEdges:
+        """The same with other paths for smooth edges, (k, 2) ends and (k, PATH_POINTS, 3), from the lower ends."""
+        n = int(self.edges.max()) + 1
+        which = np.searchsorted(self.edges @ np.array([n, 1]), edges @ np.array([n, 1]))
+        points = self.path_points.copy()
+        points[self.path_offsets[which][:, None] + np.arange(PATH_POINTS)] = paths
+        return replace(self, path_points=points)
 
 
 def trace_paths(quad_mesh: QuadMesh, features: Features) -> LayoutEdges:
@@ -57,8 +72,7 @@ def trace_paths(quad_mesh: QuadMesh, features: Features) -> LayoutEdges:
     curve = np.full(e, -1, dtype=np.int64)
     curve[which] = quad_mesh.side_curve
     kind = np.where(curve >= 0, features.kind[curve] if len(features.kind) else 0, 0)
-    low = np.where(mesh.kind[sides[:, 0]] == 1, mesh.vs[sides[:, 0]], 0.0)
-    high = np.where(mesh.kind[sides[:, 1]] == 1, mesh.vs[sides[:, 1]], features.lengths[quad_mesh.side_curve])
+    low, high = (np.ascontiguousarray(arc) for arc in side_arcs(quad_mesh).T)
     arc_offsets = np.zeros(len(sides) + 1, dtype=np.int64)
     kernel.curve_paths(ground, quad_mesh.side_curve, low, high, arc_offsets, np.empty((0, 3)))
     stretch = np.empty((int(arc_offsets[-1]), 3))

@@ -1,7 +1,8 @@
 """`QuadLayout`: quads over a triangulation, each to become one patch, with the path every edge takes on the surface.
 
 `quad_layout` finds one: features and sizes of the triangulation, coarse triangles along the features, pairs of them
-made quads, all split into quads only (where features crowd, no more than must be), made regular, then smoothed.
+made quads, all split into quads only (where features crowd, no more than must be), made regular, smoothed, and opened
+where they fold between their sides.
 """
 
 from __future__ import annotations
@@ -34,8 +35,10 @@ SPARSE = 1.5  # size of the coarse triangles then, in wanted sizes of quads: two
 class LayoutReport:
     """How good a layout is.
 
-    `folded` counts quads turned against the surface; the scaled Jacobian of a quad is the least sine of its corners'
-    angles, seen along the surface normal (1 is a rectangle, 0 a triangle, negative a fold); `feature_coverage` is the
+    The scaled Jacobian of a quad is the least sine of the angles at its corners and between its sides, seen along the
+    surface normal and measured on 4 x 4 quads that it is split into, or on itself where the surface bends over it (1 is
+    a rectangle, 0 a triangle, negative a fold);
+    `folded` counts quads where it is not positive; `feature_coverage` is the
     share of the sharp and boundary length that quad edges follow; `euler` is that of the layout and that of the
     triangulation.
     """
@@ -237,11 +240,15 @@ def _folded(quad_mesh: QuadMesh) -> int:
 def _finish(quad_mesh: QuadMesh, features: Features, begin: float) -> QuadLayout:
     """Edges, paths, tags and the report of a quad mesh."""
     from patchwright.repair.layout.layout_paths import quad_tags, trace_paths
-    from patchwright.repair.layout.quad_smooth import scaled_jacobians
+    from patchwright.repair.layout.opened_quads import opened
 
     own = trace_paths(quad_mesh, features)
+    room = opened(quad_mesh, own.middles())
+    if len(room.edges):
+        quad_mesh = room.quad_mesh
+        own = trace_paths(quad_mesh, features).led_along(room.edges, room.paths)
     vertices, quads = quad_mesh.mesh.X, quad_mesh.quads
-    quality = scaled_jacobians(quad_mesh)
+    quality = room.quality
     body = features.body
     sides = (3 * len(body) + int((features.neighbours < 0).sum())) // 2
     report = LayoutReport(

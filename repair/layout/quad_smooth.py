@@ -21,13 +21,13 @@ PASSES = 6  # over all vertices in a round
 GOAL = 0.6  # corner quality that evening out may go down to, and from which on no better place is searched for
 
 
-def smooth(quad_mesh: QuadMesh, *, rounds: int = ROUNDS) -> None:
-    """Move the vertices of `quad_mesh` in place."""
+def smooth(quad_mesh: QuadMesh, *, rounds: int = ROUNDS, free: BoolArray | None = None) -> None:
+    """Move the vertices of `quad_mesh` in place; only those of `free` (n,) where it is given."""
     from patchwright.repair.layout import _quad_kernel as kernel
 
     mesh, ground, quads = quad_mesh.mesh, quad_mesh.ground, np.ascontiguousarray(quad_mesh.quads)
     n = len(mesh.X)
-    offsets, around = _csr(quads.reshape(-1), np.repeat(np.arange(len(quads)), 4), n)
+    offsets, around = corners_by_vertex(quads, n)
     one, two = quads.reshape(-1), np.roll(quads, -1, axis=1).reshape(-1)
     key = np.unique(np.minimum(one, two) * n + np.maximum(one, two))
     lo, hi = key // n, key % n
@@ -35,14 +35,15 @@ def smooth(quad_mesh: QuadMesh, *, rounds: int = ROUNDS) -> None:
     low, high = np.full(n, -1, dtype=np.int64), np.full(n, -1, dtype=np.int64)
     high[quad_mesh.sides[:, 0]] = quad_mesh.sides[:, 1]
     low[quad_mesh.sides[:, 1]] = quad_mesh.sides[:, 0]
-    busy = np.ones(n, dtype=bool)
+    allowed = np.ones(n, dtype=bool) if free is None else free
+    busy = allowed
     for turn in range(rounds + EXTRA if rounds else 0):
         if turn >= rounds:
             poor: BoolArray = scaled_jacobians(quad_mesh) <= POOR
             if not poor.any():
                 break
             beside = np.asarray(_around(quads, poor, n)[quads].any(axis=1))
-            busy = _around(quads, beside, n)
+            busy = _around(quads, beside, n) & allowed
         update_outward(mesh, ground, quads, quad_mesh.region, quad_mesh.outward)
         kernel.smooth_quads(
             mesh, ground, quads, quad_mesh.outward, offsets, around, near_offsets, near, low, high, busy, GOAL, PASSES
@@ -83,6 +84,11 @@ def scaled_jacobians(quad_mesh: QuadMesh) -> Array:
     out = np.empty(len(quad_mesh.quads))
     kernel.all_qualities(quad_mesh.mesh, np.ascontiguousarray(quad_mesh.quads), quad_mesh.outward, out)
     return out
+
+
+def corners_by_vertex(quads: IntArray, count: int) -> tuple[Any, Any]:
+    """The quads round each vertex as (offsets, quads)."""
+    return _csr(quads.reshape(-1), np.repeat(np.arange(len(quads)), 4), count)
 
 
 def _csr(owner: IntArray, values: IntArray, count: int) -> tuple[Any, Any]:

@@ -72,7 +72,7 @@ def test_the_layout_of_a_cone_keeps_its_apex(rings):
     layout = quad_layout(body)
     assert (layout.vertices == body.vertices[0]).all(axis=1).any()
     assert layout.report.folded == 0
-    assert layout.report.min_scaled_jacobian > 0.2
+    assert layout.report.min_scaled_jacobian > 0.15  # of 4 x 4 in each quad: the one at the apex is the narrowest
     assert len(layout) < 300
 
 
