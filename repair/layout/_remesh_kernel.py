@@ -24,7 +24,6 @@ _ACROSS = 0.5  # of the way along a curve to the next vertex: across narrower st
 _LENGTHENED = 1.05  # how much a collapse may lengthen an edge that is too long already
 _HALF = 0.8  # longest half of a split edge against the edge
 _APART = 0.02  # of a split edge: where its middle is nearer to a corner opposite, the edge is one to flip
-_ALONE = 0.5  # share of its quality a triangle counts where its corner on a curve, which is nearly straight, is its own
 _REFUSED = -9.0  # score of a collapse that is not allowed; below any quality
 
 
@@ -356,28 +355,6 @@ def collapse_pass(m, g, count, scale, limit):
     return done
 
 
-@inner
-def alone(m, t, o, i, j, k):
-    """Whether a triangle of the corners of t and its neighbour o is the only one at a vertex on its side of a curve."""
-    return (
-        (m.kind[i] == 1 and hard_side(m, t, o, i, j) and hard_side(m, t, o, k, i))
-        or (m.kind[j] == 1 and hard_side(m, t, o, i, j) and hard_side(m, t, o, j, k))
-        or (m.kind[k] == 1 and hard_side(m, t, o, j, k) and hard_side(m, t, o, k, i))
-    )
-
-
-@inner
-def hard_side(m, t, o, a, b):
-    """Whether a to b is a side of t or o that lies on a curve."""
-    T, F = m.T, m.F
-    for k in range(3):
-        if F[t, k] >= 0 and T[t, k] == a and T[t, (k + 1) % 3] == b:
-            return True
-        if F[o, k] >= 0 and T[o, k] == a and T[o, (k + 1) % 3] == b:
-            return True
-    return False
-
-
 @njit(cache=True, nogil=True, error_model="numpy", no_cfunc_wrapper=True)
 def flip_pass(m, g, count):
     """Turn smooth edges where that betters the worse of the two triangles; how many."""
@@ -406,8 +383,6 @@ def flip_pass(m, g, count):
                 else:
                     i, j, k3 = d, b, c
                 value = quality(m, g, i, j, k3, region, np.int64(1))
-                if value > 0.0 and alone(m, t, o, i, j, k3):
-                    value *= _ALONE
                 if piece < 2:
                     old = min(old, value)
                 else:

@@ -80,7 +80,13 @@ class Features:
         return np.stack([self.vertices[here], self.vertices[here + 1]], axis=1)
 
 
-def find_features(triangulation: Triangulation, *, angle: float = 30.0, frozen: IntArray | None = None) -> Features:
+def find_features(
+    triangulation: Triangulation,
+    *,
+    angle: float = 30.0,
+    frozen: IntArray | None = None,
+    sharp_before: IntArray | None = None,
+) -> Features:
     """The feature curves of an oriented 2-manifold.
 
     Parameters
@@ -88,6 +94,7 @@ def find_features(triangulation: Triangulation, *, angle: float = 30.0, frozen: 
     triangulation : closed or with boundary
     angle : degrees; edges that turn more are sharp
     frozen : (k, 2) vertex pairs of further edges that curves must follow, or None
+    sharp_before : (k, 2) vertex pairs of the sharp edges of an earlier search, which stay sharp, or None
 
     Raises
     ------
@@ -97,7 +104,7 @@ def find_features(triangulation: Triangulation, *, angle: float = 30.0, frozen: 
 
     if not len(triangulation):
         raise GeometryError("a layout needs at least one triangle")
-    body, wanted = _split_touching(triangulation, frozen)
+    body, wanted, known = _split_touching(triangulation, frozen, sharp_before)
     adjacency = Adjacency.of(body)
     edges, sides = np.asarray(adjacency.edges), np.asarray(adjacency.triangle_edges)
     neighbours = np.ascontiguousarray(adjacency.neighbours, dtype=np.int64)
@@ -112,7 +119,7 @@ def find_features(triangulation: Triangulation, *, angle: float = 30.0, frozen: 
     cosine[free] = 1.0
     sharp = cosine < np.cos(np.radians(angle))
     weak = cosine < np.cos(np.radians(HYSTERESIS * angle))
-    follow = np.isin(edges[:, 0] * len(body.vertices) + edges[:, 1], wanted)
+    follow, stays = (np.isin(edges[:, 0] * len(body.vertices) + edges[:, 1], keys) for keys in (wanted, known))
     firm = free | follow
     points, length = body.vertices, np.linalg.norm(body.vertices[edges[:, 1]] - body.vertices[edges[:, 0]], axis=1)
     sharp &= not_specks(edges, sharp | firm, firm, length, body.diagonal)
@@ -128,7 +135,7 @@ def find_features(triangulation: Triangulation, *, angle: float = 30.0, frozen: 
     least = max(width, SPECK * body.diagonal) ** 2
     if merge_specks(body, neighbours, normals, sides, sharp, firm, length, least, np.cos(np.radians(angle))):
         sharp &= not_specks(edges, sharp | firm, firm, length, body.diagonal)
-    kind = np.where(free, BOUNDARY, np.where(sharp, SHARP, np.where(follow, FOLLOWED, 0)))
+    kind = np.where(free, BOUNDARY, np.where(sharp | stays, SHARP, np.where(follow, FOLLOWED, 0)))
     on_curve = np.zeros(len(points), dtype=bool)
     on_curve[edges[kind > 0]] = True
     tips = find_tips(body, normals, on_curve, angle, max(width, SPECK * body.diagonal))
@@ -238,8 +245,8 @@ def _outside(owner: IntArray, before: BoolArray, after: BoolArray) -> IntArray:
     return row[(row < last[owner[row]]) | (row >= first[owner[row]])]
 
 
-def _split_touching(triangulation: Triangulation, frozen: IntArray | None) -> tuple[Triangulation, IntArray]:
-    """One vertex per fan of triangles, unused vertices dropped; and the keys (lo * n + hi) of the frozen edges."""
+def _split_touching(triangulation: Triangulation, *asked: IntArray | None) -> tuple[Triangulation, IntArray, IntArray]:
+    """One vertex per fan of triangles, unused vertices dropped; and the keys (lo * n + hi) of two sets of edges."""
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
 
@@ -270,17 +277,20 @@ def _split_touching(triangulation: Triangulation, frozen: IntArray | None) -> tu
     vertices = np.empty((count, 3))
     vertices[label] = triangulation.vertices[triangles.reshape(-1)]
     body = replace(triangulation, vertices=vertices, triangles=label.reshape(-1, 3).astype(np.int64), uv=None)
-    wanted = np.zeros(0, dtype=np.int64)
-    if frozen is not None and len(frozen):
-        old = np.sort(np.asarray(frozen, dtype=np.int64), axis=1)
-        a = triangles.reshape(-1)
-        b = np.roll(triangles, -1, axis=1).reshape(-1)
-        n = len(triangulation.vertices)
-        asked = np.isin(np.minimum(a, b) * n + np.maximum(a, b), old[:, 0] * n + old[:, 1])
-        new = label.reshape(-1, 3)
-        c, d = new.reshape(-1)[asked], np.roll(new, -1, axis=1).reshape(-1)[asked]
-        wanted = np.minimum(c, d) * count + np.maximum(c, d)
-    return body, wanted.astype(np.int64)
+    first, second = (_keys(triangulation, label.reshape(-1, 3), edges) for edges in asked)
+    return body, first, second
+
+
+def _keys(triangulation: Triangulation, new: IntArray, edges: IntArray | None) -> IntArray:
+    """Keys, in the numbers of the corners `new` (m, 3), of edges given as vertex pairs (k, 2)."""
+    if edges is None or not len(edges):
+        return np.zeros(0, dtype=np.int64)
+    old = np.sort(np.asarray(edges, dtype=np.int64), axis=1)
+    n, count = len(triangulation.vertices), int(new.max()) + 1
+    a, b = triangulation.triangles.reshape(-1), np.roll(triangulation.triangles, -1, axis=1).reshape(-1)
+    asked = np.isin(np.minimum(a, b) * n + np.maximum(a, b), old[:, 0] * n + old[:, 1])
+    c, d = new.reshape(-1)[asked], np.roll(new, -1, axis=1).reshape(-1)[asked]
+    return (np.minimum(c, d) * count + np.maximum(c, d)).astype(np.int64)
 
 
 def _normals(body: Triangulation, neighbours: IntArray, edges: IntArray) -> tuple[Array, float]:

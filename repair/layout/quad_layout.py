@@ -170,7 +170,7 @@ def quad_layout(
 
 def _with_ridges(features: Features, angle: float) -> tuple[Features, Ridges | None]:
     """The features with the ridge lines among the curves to follow, and those ridges; None where there are none."""
-    from patchwright.repair.layout.features import FOLLOWED, find_features
+    from patchwright.repair.layout.features import FOLLOWED, SHARP, find_features
     from patchwright.repair.layout.ridges import find_ridges
     from patchwright.repair.layout.sizing import surface_curvature, widest_ridge
 
@@ -178,7 +178,8 @@ def _with_ridges(features: Features, angle: float) -> tuple[Features, Ridges | N
     if not len(ridges.edges):
         return features, None
     follow = np.concatenate([features.curve_edges(FOLLOWED), ridges.edges])
-    return find_features(features.body, angle=angle, frozen=follow), ridges
+    sharp = features.curve_edges(SHARP)
+    return find_features(features.body, angle=angle, frozen=follow, sharp_before=sharp), ridges
 
 
 def _pairs(features: Features, ridges: Ridges | None, target: int | None) -> QuadMesh:

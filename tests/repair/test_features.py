@@ -181,3 +181,13 @@ def test_a_tooth_is_cut_off():
         normals, sharp = np.array(body.normals), line(0, 1, 4, 2, 3)
         cut_teeth(body, neighbours, normals, edges, sides, sharp, firm, length, width)
         np.testing.assert_array_equal(sharp, line(0, 1, 2, 3) if straight else line(0, 1, 4, 2, 3))
+
+
+def test_edges_that_were_sharp_before_stay_sharp_whatever_is_found_now():
+    body = cube(3)
+    found = find_features(body)
+    edges = found.curve_edges(SHARP)
+    assert len(edges)
+    assert not len(find_features(found.body, angle=120.0).curve_edges(SHARP))
+    again = find_features(found.body, angle=120.0, sharp_before=edges[::2]).curve_edges(SHARP)
+    assert {frozenset(e) for e in again.tolist()} == {frozenset(e) for e in edges[::2].tolist()}
