@@ -277,7 +277,7 @@ def _split_touching(triangulation: Triangulation, *asked: IntArray | None) -> tu
     vertices = np.empty((count, 3))
     vertices[label] = triangulation.vertices[triangles.reshape(-1)]
     body = replace(triangulation, vertices=vertices, triangles=label.reshape(-1, 3).astype(np.int64), uv=None)
-    first, second = (_keys(triangulation, label.reshape(-1, 3), edges) for edges in asked)
+    first, second = (_keys(triangulation, body.triangles, edges) for edges in asked)
     return body, first, second
 
 
