@@ -48,6 +48,7 @@ RETRIES = 1
 FINER = 2.0  # quads of each retry against the one before
 WIDEST = 10.0  # times: how far a fit tolerance nobody asked for may widen to the height of coarse facets
 CHORD = 0.25  # of the fit tolerance: how far a tessellation of the patches may stray from them
+MEASURED_CHORD = 0.1  # the same where distances are measured: on top of those of the patches
 GRID = 8  # intervals per patch side of the structured grid
 
 
@@ -164,7 +165,7 @@ def _fit(
         limits = tolerance.of_tags(body.tag_names, quads.tags)
         network = resurface(quads, target, tolerance, limits=limits, noise=mended.noise, progress=progress)
         progress("measuring coverage", 0.0)
-        tessellation = tessellation_within(network, CHORD * tolerance.tightest)
+        tessellation = tessellation_within(network, MEASURED_CHORD * tolerance.tightest)
         assert tessellation.tags is not None
         skip = network_invented(network, tessellation)
         own = tolerance.of_tags(body.tag_names, body.tags if body.tags is not None else np.zeros(len(body), dtype=int))
