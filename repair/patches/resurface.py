@@ -34,6 +34,7 @@ MOST_CELLS = 16
 LEANING = 4.0  # times: a direction in which the error changes so much less than in the other gets no more pieces
 WORTH = 0.8  # twice the pieces must bring the error below this share of what it was, or they count as barren
 FINISHING = 2  # rounds more in which what the last joins have moved beyond the tolerance is fitted again
+FINISHED = 5000  # patches: of more a join takes minutes, and what was fitted in the rounds before has to do
 FEW = 0.005  # of all patches: so few are not worth such a round
 DRAWN_OFF = 1.5  # times the error it had or may have: a patch that joining takes farther off is stiffer the next time
 PATIENCE = 3  # barren doublings in a row after which a curve or patch is left as it is
@@ -117,8 +118,9 @@ def resurface(
     barren_patches = np.zeros(len(layout.quads), dtype=np.int64)
     edge_error = edge_errors(layout, edges, target)
     rough = Roughness.of(layout, smooth.nets, tolerance)
-    for turn in range(rounds + FINISHING):
-        say("refining patches", (turn + 1) / (rounds + FINISHING + 1))
+    most = rounds + (FINISHING if len(layout.quads) <= FINISHED else 0)
+    for turn in range(most):
+        say("refining patches", (turn + 1) / (most + 1))
         poor = (smooth.error > allowed) & (barren_patches < PATIENCE)
         if turn >= rounds and poor.mean() < FEW:
             break
