@@ -21,8 +21,8 @@ PASSES = 6  # over all vertices in a round
 GOAL = 0.6  # corner quality that evening out may go down to, and from which on no better place is searched for
 
 
-def smooth(quad_mesh: QuadMesh, *, rounds: int = ROUNDS, free: BoolArray | None = None) -> None:
-    """Move the vertices of `quad_mesh` in place; only those of `free` (n,) where it is given."""
+def smooth(quad_mesh: QuadMesh, *, rounds: int = ROUNDS) -> None:
+    """Move the vertices of `quad_mesh` in place."""
     from patchwright.repair.layout import _quad_kernel as kernel
 
     mesh, ground, quads = quad_mesh.mesh, quad_mesh.ground, np.ascontiguousarray(quad_mesh.quads)
@@ -35,15 +35,14 @@ def smooth(quad_mesh: QuadMesh, *, rounds: int = ROUNDS, free: BoolArray | None 
     low, high = np.full(n, -1, dtype=np.int64), np.full(n, -1, dtype=np.int64)
     high[quad_mesh.sides[:, 0]] = quad_mesh.sides[:, 1]
     low[quad_mesh.sides[:, 1]] = quad_mesh.sides[:, 0]
-    allowed = np.ones(n, dtype=bool) if free is None else free
-    busy = allowed
+    busy = np.ones(n, dtype=bool)
     for turn in range(rounds + EXTRA if rounds else 0):
         if turn >= rounds:
             poor: BoolArray = scaled_jacobians(quad_mesh) <= POOR
             if not poor.any():
                 break
             beside = np.asarray(_around(quads, poor, n)[quads].any(axis=1))
-            busy = _around(quads, beside, n) & allowed
+            busy = _around(quads, beside, n)
         update_outward(mesh, ground, quads, quad_mesh.region, quad_mesh.outward)
         kernel.smooth_quads(
             mesh, ground, quads, quad_mesh.outward, offsets, around, near_offsets, near, low, high, busy, GOAL, PASSES
